@@ -1,0 +1,238 @@
+#include <doctest.h>
+
+#include <cmath>
+#include <string>
+
+#include "mellin/core/arena.hpp"
+#include "mellin/core/containers.hpp"
+#include "mellin/core/log.hpp"
+#include "mellin/core/math.hpp"
+#include "mellin/core/random.hpp"
+#include "mellin/core/se2.hpp"
+#include "mellin/core/status.hpp"
+
+using namespace mellin;
+
+namespace {
+
+/// Distance of two doubles in units of the last place of the second.
+double ulps(double value, long double exact) {
+  const double rounded = static_cast<double>(exact);
+  const double ulp = std::nextafter(std::fabs(rounded), INFINITY) - std::fabs(rounded);
+  return static_cast<double>(std::fabs(static_cast<long double>(value) - exact) / static_cast<long double>(ulp));
+}
+
+}  // namespace
+
+TEST_CASE("sine and cosine agree with long double over many turns") {
+  double worst = 0.0;
+  for (int i = -200000; i <= 200000; ++i) {
+    const double x = i * 0.0031415;
+    const SinCos r = sincos(x);
+    worst = std::max(worst, std::fabs(r.sin - static_cast<double>(sinl(x))));
+    worst = std::max(worst, std::fabs(r.cos - static_cast<double>(cosl(x))));
+  }
+  CHECK(worst < 3e-16);
+  CHECK(std::isnan(sincos(INFINITY).sin));
+  CHECK(std::isnan(sincos(NAN).cos));
+}
+
+TEST_CASE("float sine and cosine agree with double") {
+  double worst = 0.0;
+  for (int i = -100000; i <= 100000; ++i) {
+    const float x = static_cast<float>(i) * 0.0099F;
+    const SinCosF r = sincos(x);
+    worst = std::max(worst, std::fabs(static_cast<double>(r.sin) - std::sin(static_cast<double>(x))));
+    worst = std::max(worst, std::fabs(static_cast<double>(r.cos) - std::cos(static_cast<double>(x))));
+  }
+  CHECK(worst < 1.5e-7);
+}
+
+TEST_CASE("atan2 agrees with long double in all quadrants and on the axes") {
+  double worst = 0.0;
+  for (int i = 0; i < 100000; ++i) {
+    const double angle = -kPi + kTwoPi * (i + 0.5) / 100000;
+    const double length = std::pow(10.0, i % 13 - 6);
+    const double y = length * std::sin(angle);
+    const double x = length * std::cos(angle);
+    worst = std::max(worst, ulps(mellin::atan2(y, x), atan2l(y, x)));
+  }
+  CHECK(worst < 3.0);
+  CHECK(mellin::atan2(0.0, 0.0) == 0.0);
+  CHECK(mellin::atan2(0.0, -1.0) == doctest::Approx(kPi));
+  CHECK(mellin::atan2(-1.0, 0.0) == doctest::Approx(-kHalfPi));
+  CHECK(std::isnan(mellin::atan2(NAN, 1.0)));
+}
+
+TEST_CASE("exp and log agree with long double, and take the edges") {
+  double worst_exp = 0.0;
+  double worst_log = 0.0;
+  for (int i = -70000; i <= 70000; ++i) {
+    const double x = i * 0.01;
+    worst_exp = std::max(worst_exp, ulps(mellin::exp(x), expl(x)));
+    const double y = std::exp(x);
+    if (std::fabs(x) > 0.5) {
+      worst_log = std::max(worst_log, ulps(mellin::log(y), logl(y)));
+    }
+  }
+  CHECK(worst_exp < 2.0);
+  CHECK(worst_log < 2.0);
+  CHECK(mellin::exp(0.0) == 1.0);
+  CHECK(mellin::exp(1000.0) == INFINITY);
+  CHECK(mellin::exp(-1000.0) == 0.0);
+  CHECK(mellin::log(1.0) == 0.0);
+  CHECK(mellin::log(0.0) == -INFINITY);
+  CHECK(std::isnan(mellin::log(-1.0)));
+  CHECK(ulps(mellin::log(5e-324), logl(static_cast<long double>(5e-324))) < 2.0);
+}
+
+TEST_CASE("angles wrap into [-pi, pi)") {
+  CHECK(wrap_angle(kPi) == -kPi);
+  CHECK(wrap_angle(-kPi) == -kPi);
+  CHECK(wrap_angle(3 * kTwoPi + 0.5) == doctest::Approx(0.5));
+  CHECK(wrap_angle(-5 * kTwoPi - 3.0) == doctest::Approx(-3.0));
+}
+
+TEST_CASE("poses: composition, inverse and between belong together") {
+  const Pose2 a{1.0, 2.0, 0.3};
+  const Pose2 b{-0.5, 4.0, -2.9};
+  const Pose2 ab = compose(a, b);
+  const Pose2 back = between(a, ab);
+  CHECK(back.x == doctest::Approx(b.x));
+  CHECK(back.y == doctest::Approx(b.y));
+  CHECK(back.theta == doctest::Approx(b.theta));
+  const Pose2 none = compose(a, inverse(a));
+  CHECK(none.x == doctest::Approx(0.0));
+  CHECK(none.y == doctest::Approx(0.0));
+  CHECK(none.theta == doctest::Approx(0.0));
+  const Pose2 quarter = compose({0.0, 0.0, kHalfPi}, {1.0, 0.0, 0.0});
+  CHECK(quarter.x == doctest::Approx(0.0));
+  CHECK(quarter.y == doctest::Approx(1.0));
+}
+
+TEST_CASE("symmetric matrices: inverse times matrix is the identity, and what has none is refused") {
+  const Sym3 m{4.0, 1.0, 0.5, 3.0, -0.2, 2.0};
+  Sym3 inv;
+  REQUIRE(invert(m, inv));
+  CHECK(m.xx * inv.xx + m.xy * inv.xy + m.xt * inv.xt == doctest::Approx(1.0));
+  CHECK(m.xx * inv.xy + m.xy * inv.yy + m.xt * inv.yt == doctest::Approx(0.0));
+  CHECK(m.xt * inv.xt + m.yt * inv.yt + m.tt * inv.tt == doctest::Approx(1.0));
+  CHECK_FALSE(invert(diagonal(1.0, 0.0, 1.0), inv));
+  CHECK_FALSE(invert(diagonal(1.0, NAN, 1.0), inv));
+}
+
+TEST_CASE("covariance of a composition agrees with sampling") {
+  const Pose2 ab{2.0, -1.0, 0.7};
+  const Pose2 bc{3.0, 0.5, -0.4};
+  const Sym3 cov_ab{1e-4, 2e-5, 1e-5, 4e-4, -1e-5, 9e-6};
+  const Sym3 cov_bc = diagonal(1e-4, 2e-4, 4e-6);
+  const Sym3 expected = compose_covariance(ab, cov_ab, bc, cov_bc);
+  // Cholesky of cov_ab, to draw from it.
+  const double l11 = std::sqrt(cov_ab.xx), l21 = cov_ab.xy / l11, l31 = cov_ab.xt / l11;
+  const double l22 = std::sqrt(cov_ab.yy - l21 * l21), l32 = (cov_ab.yt - l31 * l21) / l22;
+  const double l33 = std::sqrt(cov_ab.tt - l31 * l31 - l32 * l32);
+  Random random(1, 2);
+  const Pose2 mean = compose(ab, bc);
+  double xx = 0.0, xt = 0.0, yy = 0.0, tt = 0.0;
+  constexpr int kDraws = 200000;
+  for (int i = 0; i < kDraws; ++i) {
+    const double u = random.normal(), v = random.normal(), w = random.normal();
+    const Pose2 first{ab.x + l11 * u, ab.y + l21 * u + l22 * v, ab.theta + l31 * u + l32 * v + l33 * w};
+    const Pose2 second{bc.x + 1e-2 * random.normal(), bc.y + std::sqrt(2e-4) * random.normal(),
+                       bc.theta + 2e-3 * random.normal()};
+    const Pose2 c = compose(first, second);
+    const double dx = c.x - mean.x, dy = c.y - mean.y, dt = wrap_angle(c.theta - mean.theta);
+    xx += dx * dx, xt += dx * dt, yy += dy * dy, tt += dt * dt;
+  }
+  CHECK(xx / kDraws == doctest::Approx(expected.xx).epsilon(0.03));
+  CHECK(xt / kDraws == doctest::Approx(expected.xt).epsilon(0.05));
+  CHECK(yy / kDraws == doctest::Approx(expected.yy).epsilon(0.03));
+  CHECK(tt / kDraws == doctest::Approx(expected.tt).epsilon(0.03));
+  const Sym3 twice = inverse_covariance(inverse(ab), inverse_covariance(ab, cov_ab));
+  CHECK(twice.xx == doctest::Approx(cov_ab.xx));
+  CHECK(twice.xt == doctest::Approx(cov_ab.xt));
+  CHECK(twice.yt == doctest::Approx(cov_ab.yt));
+}
+
+TEST_CASE("random numbers: a stream depends on its seed and name only, and is distributed as it says") {
+  Random a(7, 1), b(7, 1), c(7, 2), d(8, 1);
+  const std::uint64_t first = a.bits();
+  CHECK(first == b.bits());
+  CHECK(first != c.bits());
+  CHECK(first != d.bits());
+  double sum = 0.0, squares = 0.0, cubes = 0.0, fourth = 0.0;
+  constexpr int kDraws = 400000;
+  for (int i = 0; i < kDraws; ++i) {
+    const double x = a.normal();
+    sum += x, squares += x * x, cubes += x * x * x, fourth += x * x * x * x;
+  }
+  CHECK(std::fabs(sum / kDraws) < 0.01);
+  CHECK(squares / kDraws == doctest::Approx(1.0).epsilon(0.01));
+  CHECK(std::fabs(cubes / kDraws) < 0.02);
+  CHECK(fourth / kDraws == doctest::Approx(3.0).epsilon(0.02));
+}
+
+TEST_CASE("arena: what is measured is what is used, and one byte less is refused") {
+  const auto carve = [](auto& arena) {
+    (void)arena.template take<std::uint8_t>(13, Part::grid);
+    (void)arena.template take<double>(3, Part::graph);
+    return arena.template take<std::uint16_t>(5, Part::grid, Region::fast);
+  };
+  MeasureArena measure;
+  CHECK(carve(measure).size() == 5);
+  CHECK(measure.use().total() == 16 + 24 + 16);
+  CHECK(measure.use().by_part[static_cast<int>(Part::grid)] == 32);
+  alignas(kArenaAlignment) std::byte memory[56];
+  Arena exact{Span<std::byte>(memory, 56)};
+  CHECK(carve(exact).size() == 5);
+  CHECK(exact.ok());
+  CHECK(exact.use().total() == measure.use().total());
+  Arena short_by_one{Span<std::byte>(memory, 55)};
+  (void)carve(short_by_one);
+  CHECK_FALSE(short_by_one.ok());
+  Arena split{Span<std::byte>(memory, 40), Span<std::byte>(memory + 40, 16)};
+  (void)carve(split);
+  CHECK(split.ok());
+}
+
+TEST_CASE("ring: first in, first out across the seam") {
+  int memory[3] = {};
+  Ring<int> ring{Span<int>(memory)};
+  ring.push(1);
+  ring.push(2);
+  ring.pop();
+  ring.push(3);
+  ring.push(4);
+  CHECK(ring.full());
+  CHECK(ring[0] == 2);
+  CHECK(ring[1] == 3);
+  CHECK(ring.back() == 4);
+}
+
+TEST_CASE("fixed list: sorted insertion drops the last when full") {
+  FixedList<int, 3> list;
+  CHECK(list.push(10));
+  CHECK(list.push(20));
+  CHECK(list.push(30));
+  CHECK_FALSE(list.push(40));
+  list.insert(1, 15);
+  CHECK(list[0] == 10);
+  CHECK(list[1] == 15);
+  CHECK(list[2] == 20);
+  list.insert(3, 99);
+  CHECK(list[2] == 20);
+}
+
+TEST_CASE("log lines: numbers are written without printf, and long lines are cut") {
+  LogLine line;
+  line << "n=" << std::int64_t{-42} << " x=" << 1.25 << " y=" << -0.00005 << " z=" << NAN;
+  CHECK(std::string(line.text()) == "n=-42 x=1.2500 y=-0.0001 z=nan");
+  LogLine most;
+  most << INT64_MIN;
+  CHECK(std::string(most.text()) == "-9223372036854775808");
+  LogLine cut;
+  for (int i = 0; i < 100; ++i) {
+    cut << "0123456789";
+  }
+  CHECK(std::string(cut.text()).size() == 159);
+}
