@@ -1,0 +1,7 @@
+// The program's subcommands. Each adds itself to the command line; its callback throws std::exception where the input
+// or the machine is at fault (exit status 1, the message on standard error).
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+namespace mellin::program {}  // namespace mellin::program

@@ -1,0 +1,19 @@
+// mellin: maps logs, registers grids, optimises pose graphs. The contract of its calls and files is in the README.
+#include <cstdio>
+#include <exception>
+
+#include "program/commands.hpp"
+
+int main(int argc, char** argv) {
+  CLI::App app{"Hierarchical 2D lidar SLAM: maps logs, registers grids, optimises pose graphs"};
+  app.require_subcommand(1);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "mellin: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}
