@@ -1,0 +1,78 @@
+// The live map of one particle: counts, and beside them the likelihood field that scan matching reads (how near a point
+// is to something solid), kept up to date cell by cell as scans come and go.
+#pragma once
+
+#include <cstdint>
+
+#include "mellin/core/arena.hpp"
+#include "mellin/grid/counting_grid.hpp"
+#include "mellin/mapping/scan_memory.hpp"
+
+namespace mellin {
+
+/// The field is 255 in a cell that is surely solid and falls off with a Gaussian of 1.5 cells round it, over 2 cells:
+/// the maximum over the 5 x 5 neighbourhood, so that it is a function of the counts alone, whatever their history.
+class LiveGrid {
+ public:
+  struct Memory {
+    Span<CellCount> cells;
+    Span<std::uint8_t> field;
+  };
+  template <class A>
+  static constexpr Memory carve(A& arena, std::uint16_t side, std::size_t grids) {
+    return {CountingGrid::carve(arena, side, grids).cells,
+            arena.template take<std::uint8_t>(grids * side * side, Part::grid)};
+  }
+
+  LiveGrid() = default;
+  LiveGrid(Span<CellCount> cells, Span<std::uint8_t> field, std::uint16_t side, float cell_m)
+      : grid_(cells, side), field_(field), cell_m_(cell_m) {}
+
+  const CountingGrid& grid() const { return grid_; }
+  float cell_m() const { return cell_m_; }
+
+  /// Forgets everything; the window is centred on the given point.
+  void reset(const Pose2& centre);
+  /// Moves the window so that it is centred on the given point.
+  void roll_to(const Pose2& centre);
+  /// How far the point is from the window's centre, in cells along the farther axis.
+  std::int32_t off_centre(const Pose2& point) const;
+
+  /// Counts a scan at a pose within `rect` (which lies in the window), or takes it back.
+  void add(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect);
+  void remove(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect);
+
+  /// The field in a cell of the world grid; 0 outside the window.
+  std::uint8_t field(std::int32_t column, std::int32_t row) const {
+    return grid_.window().contains(column, row) ? field_[grid_.index(column, row)] : std::uint8_t{0};
+  }
+
+  /// Makes this grid equal to another one of the same size.
+  void copy_from(const LiveGrid& other);
+
+ private:
+  template <int kSign>
+  void count(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect);
+  void solidity_changed(std::int32_t column, std::int32_t row, std::uint8_t before, std::uint8_t after);
+  std::uint8_t recomputed(std::int32_t column, std::int32_t row) const;
+  void recompute(const CellRect& rect);
+
+  CountingGrid grid_;
+  Span<std::uint8_t> field_;
+  float cell_m_ = 0.0F;
+};
+
+/// How solid a cell is, in 16 steps: the share of hits among its observations, saturated at a half, since beams that
+/// graze a wall pass through its cells as often as they end there.
+inline std::uint8_t solidity(const CellCount& cell) {
+  if (cell.hits == 0) {
+    return 0;
+  }
+  const std::uint32_t steps = (30U * cell.hits + cell.observations / 2U) / cell.observations;
+  return static_cast<std::uint8_t>(steps > 15U ? 15U : steps);
+}
+
+/// The field at a distance of (dx, dy) cells, each -2 to 2, from a cell of the given solidity.
+std::uint8_t field_value(std::uint8_t solidity, int dx, int dy);
+
+}  // namespace mellin

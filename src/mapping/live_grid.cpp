@@ -1,0 +1,137 @@
+#include "mellin/mapping/live_grid.hpp"
+
+#include <cstring>
+
+namespace mellin {
+namespace {
+
+constexpr int kReach = 2;  // cells over which the field falls off
+
+/// round(255 exp(-d^2 / (2 1.5^2))) for d^2 = dx^2 + dy^2.
+constexpr std::uint8_t kFallOff[9] = {255, 204, 164, 0, 105, 84, 0, 0, 43};
+
+}  // namespace
+
+std::uint8_t field_value(std::uint8_t solidity, int dx, int dy) {
+  return static_cast<std::uint8_t>(static_cast<unsigned>(kFallOff[dx * dx + dy * dy]) * solidity / 15U);
+}
+
+void LiveGrid::reset(const Pose2& centre) {
+  const std::int32_t half = grid_.side() / 2;
+  grid_.reset(cell_of(centre.x, cell_m_) - half, cell_of(centre.y, cell_m_) - half);
+  for (std::uint8_t& value : field_) {
+    value = 0;
+  }
+}
+
+std::int32_t LiveGrid::off_centre(const Pose2& point) const {
+  const CellRect window = grid_.window();
+  const std::int32_t half = grid_.side() / 2;
+  const std::int32_t dc = cell_of(point.x, cell_m_) - (window.column_min + half);
+  const std::int32_t dr = cell_of(point.y, cell_m_) - (window.row_min + half);
+  const std::int32_t ac = dc < 0 ? -dc : dc;
+  const std::int32_t ar = dr < 0 ? -dr : dr;
+  return ac > ar ? ac : ar;
+}
+
+void LiveGrid::roll_to(const Pose2& centre) {
+  const CellRect old = grid_.window();
+  const std::int32_t half = grid_.side() / 2;
+  grid_.roll_to(cell_of(centre.x, cell_m_) - half, cell_of(centre.y, cell_m_) - half);
+  const CellRect now = grid_.window();
+  const CellRect kept = intersection(old, now);
+  if (kept.empty()) {
+    for (std::uint8_t& value : field_) {
+      value = 0;
+    }
+    return;
+  }
+  // Cells that entered, and those whose neighbourhood changed: all but the kept ones that lie deeper than the reach
+  // within both windows. A side that did not move has no such margin.
+  const CellRect same{kept.column_min + (old.column_min == now.column_min ? 0 : kReach),
+                      kept.row_min + (old.row_min == now.row_min ? 0 : kReach),
+                      kept.column_end - (old.column_min == now.column_min ? 0 : kReach),
+                      kept.row_end - (old.row_min == now.row_min ? 0 : kReach)};
+  recompute({now.column_min, now.row_min, now.column_end, same.row_min});
+  recompute({now.column_min, same.row_end, now.column_end, now.row_end});
+  recompute({now.column_min, same.row_min, same.column_min, same.row_end});
+  recompute({same.column_end, same.row_min, now.column_end, same.row_end});
+}
+
+void LiveGrid::recompute(const CellRect& rect) {
+  const CellRect inside = intersection(rect, grid_.window());
+  for (std::int32_t row = inside.row_min; row < inside.row_end; ++row) {
+    for (std::int32_t column = inside.column_min; column < inside.column_end; ++column) {
+      field_[grid_.index(column, row)] = recomputed(column, row);
+    }
+  }
+}
+
+std::uint8_t LiveGrid::recomputed(std::int32_t column, std::int32_t row) const {
+  const CellRect window = grid_.window();
+  std::uint8_t best = 0;
+  for (int dy = -kReach; dy <= kReach; ++dy) {
+    for (int dx = -kReach; dx <= kReach; ++dx) {
+      if (window.contains(column + dx, row + dy)) {
+        const std::uint8_t value = field_value(solidity(grid_.at(column + dx, row + dy)), dx, dy);
+        best = value > best ? value : best;
+      }
+    }
+  }
+  return best;
+}
+
+void LiveGrid::solidity_changed(std::int32_t column, std::int32_t row, std::uint8_t before, std::uint8_t after) {
+  const CellRect window = grid_.window();
+  for (int dy = -kReach; dy <= kReach; ++dy) {
+    for (int dx = -kReach; dx <= kReach; ++dx) {
+      if (!window.contains(column + dx, row + dy)) {
+        continue;
+      }
+      std::uint8_t& value = field_[grid_.index(column + dx, row + dy)];
+      const std::uint8_t now = field_value(after, dx, dy);
+      if (now >= value) {
+        value = now;
+      } else if (before > after && value == field_value(before, dx, dy)) {
+        value = recomputed(column + dx, row + dy);  // this cell may have been the nearest solid one
+      }
+    }
+  }
+}
+
+template <int kSign>
+void LiveGrid::count(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect) {
+  const CellRect inside = intersection(rect, grid_.window());
+  scans.visit_rays(number, grid_pose(pose, cell_m_), cell_m_, [&](const Ray& ray) {
+    visit_ray(ray, inside, [&](std::int32_t column, std::int32_t row, bool hit) {
+      CellCount& cell = grid_.at(column, row);
+      if (cell.hits == 0 && !hit) {
+        cell.observations = static_cast<std::uint16_t>(cell.observations + kSign);
+        return;
+      }
+      const std::uint8_t before = solidity(cell);
+      cell.observations = static_cast<std::uint16_t>(cell.observations + kSign);
+      cell.hits = static_cast<std::uint16_t>(cell.hits + (hit ? kSign : 0));
+      const std::uint8_t after = solidity(cell);
+      if (after != before) {
+        solidity_changed(column, row, before, after);
+      }
+    });
+  });
+}
+
+void LiveGrid::add(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect) {
+  count<1>(scans, number, pose, rect);
+}
+
+void LiveGrid::remove(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect) {
+  count<-1>(scans, number, pose, rect);
+}
+
+void LiveGrid::copy_from(const LiveGrid& other) {
+  grid_.set_window_of(other.grid_);
+  std::memcpy(grid_.cells().data(), other.grid_.cells().data(), grid_.cells().size() * sizeof(CellCount));
+  std::memcpy(field_.data(), other.field_.data(), field_.size());
+}
+
+}  // namespace mellin
