@@ -32,9 +32,9 @@ struct World {
   static constexpr std::uint16_t kScans = 9;
   static constexpr float kCell = 0.1F;
   LaserConfig lasers[kMaxLasers];
-  std::vector<StoredRange> ranges = std::vector<StoredRange>(std::size_t{kScans} * kBeams);
-  std::vector<std::int64_t> stamps = std::vector<std::int64_t>(kScans);
-  std::vector<std::uint8_t> which = std::vector<std::uint8_t>(kScans);
+  std::vector<StoredRange> ranges = std::vector<StoredRange>((kScans + 1) * kBeams);
+  std::vector<std::int64_t> stamps = std::vector<std::int64_t>(kScans + 1);
+  std::vector<std::uint8_t> which = std::vector<std::uint8_t>(kScans + 1);
   std::vector<Point2f> directions = std::vector<Point2f>(kMaxLasers * kBeams);
   ScanMemory scans;
 
@@ -55,7 +55,8 @@ struct World {
     for (float& range : r) {
       range = random.uniform() < 0.1 ? NAN : static_cast<float>(random.uniform() * 13.0);
     }
-    return scans.push({0, Span<const float>(r.data(), r.size()), {}, 0});
+    scans.stage({0, Span<const float>(r.data(), r.size()), {}, 0});
+    return scans.take_staged();
   }
 };
 

@@ -41,9 +41,8 @@ ScanMemory::ScanMemory(const ScanMemoryConfig& config, const Memory& memory, Spa
   }
 }
 
-std::uint32_t ScanMemory::push(const Scan& scan) {
-  const std::uint32_t number = end_++;
-  const std::size_t at = slot(number);
+void ScanMemory::stage(const Scan& scan) {
+  const std::size_t at = slot(end_);
   const LaserConfig& laser = lasers_[scan.laser];
   for (std::size_t i = 0; i < config_.max_beams; ++i) {
     memory_.ranges[at * config_.max_beams + i] =
@@ -51,11 +50,10 @@ std::uint32_t ScanMemory::push(const Scan& scan) {
   }
   memory_.stamps_us[at] = scan.stamp_us;
   memory_.lasers[at] = scan.laser;
-  return number;
 }
 
 Span<const StoredRange> ScanMemory::ranges(std::uint32_t number) const {
-  assert(holds(number));
+  assert(holds(number) || number == end_);
   return memory_.ranges.subspan(slot(number) * config_.max_beams, laser(number).beams);
 }
 

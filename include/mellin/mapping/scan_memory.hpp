@@ -43,10 +43,9 @@ class ScanMemory {
   };
   template <class A>
   static constexpr Memory carve(A& arena, const ScanMemoryConfig& config) {
-    const std::size_t ranges = static_cast<std::size_t>(config.capacity) * config.max_beams;
-    return {arena.template take<StoredRange>(ranges, Part::scans),
-            arena.template take<std::int64_t>(config.capacity, Part::scans),
-            arena.template take<std::uint8_t>(config.capacity, Part::scans),
+    const std::size_t rows = config.capacity + std::size_t{1};  // and one for the staged scan
+    return {arena.template take<StoredRange>(rows * config.max_beams, Part::scans),
+            arena.template take<std::int64_t>(rows, Part::scans), arena.template take<std::uint8_t>(rows, Part::scans),
             arena.template take<Point2f>(kMaxLasers * config.max_beams, Part::scans, Region::fast)};
   }
 
@@ -54,9 +53,12 @@ class ScanMemory {
   /// `lasers` has kMaxLasers elements and stays the caller's.
   ScanMemory(const ScanMemoryConfig& config, const Memory& memory, Span<const LaserConfig> lasers);
 
-  /// Stores a scan's ranges under the next number, over the oldest one where the memory is full. Returns the number;
-  /// they count from 0 in a session.
-  std::uint32_t push(const Scan& scan);
+  /// Stores a scan's ranges beside the remembered ones, under the number end(), so that they can be matched before it
+  /// is known whether the scan is taken. Requires scan.laser < kMaxLasers.
+  void stage(const Scan& scan);
+  /// Remembers the staged scan, over the oldest one where the memory is full. Returns its number; they count from 0 in
+  /// a session.
+  std::uint32_t take_staged() { return end_++; }
   void clear() { end_ = 0; }
 
   /// One past the newest scan's number.
@@ -64,7 +66,7 @@ class ScanMemory {
   /// Whether the scan is still in memory.
   bool holds(std::uint32_t number) const { return number < end_ && end_ - number <= config_.capacity; }
 
-  /// The following require holds(number).
+  /// The following require holds(number), or number == end() for the staged scan.
   Span<const StoredRange> ranges(std::uint32_t number) const;
   std::int64_t stamp_us(std::uint32_t number) const { return memory_.stamps_us[slot(number)]; }
   const LaserConfig& laser(std::uint32_t number) const { return lasers_[memory_.lasers[slot(number)]]; }
@@ -76,7 +78,7 @@ class ScanMemory {
   void visit_rays(std::uint32_t number, const GridPose& pose, float cell_m, Visit&& visit) const;
 
  private:
-  std::size_t slot(std::uint32_t number) const { return number % config_.capacity; }
+  std::size_t slot(std::uint32_t number) const { return number % (config_.capacity + 1U); }
 
   ScanMemoryConfig config_;
   Memory memory_;

@@ -1,0 +1,66 @@
+// The local mapper (paper, Section III-A) as the rest of the system sees it: takes scans, keeps a live map of the last
+// few dozen, says where the robot is in it. The paper's own, GMapping that forgets, is particle_mapper.hpp; another one
+// takes its place by implementing this interface.
+#pragma once
+
+#include <cstdint>
+
+#include "mellin/core/se2.hpp"
+#include "mellin/core/status.hpp"
+#include "mellin/grid/counting_grid.hpp"
+#include "mellin/mapping/laser.hpp"
+#include "mellin/mapping/scan_memory.hpp"
+
+namespace mellin {
+
+enum class ScanUse : std::uint8_t {
+  taken,     ///< matched and added to the live map
+  matched,   ///< matched to the live map only
+  odometry,  ///< matching failed: the pose rides on odometry from the last one
+};
+
+struct ScanOutcome {
+  ScanUse use = ScanUse::odometry;
+  bool taken = false;             ///< added to the live map, whether matched or not
+  Pose2 session_T_base;           ///< the live pose
+  std::uint32_t anchor_scan = 0;  ///< number of the newest taken scan …
+  Pose2 anchor_T_base;            ///< … and the pose relative to it, which later corrections leave as it is
+};
+
+struct MapperStatistics {
+  std::uint32_t scans = 0;  ///< given
+  std::uint32_t taken = 0;
+  std::uint32_t unmatched = 0;  ///< rode on odometry
+  std::uint32_t refused = 0;    ///< bad_data
+  std::uint32_t resampled = 0;
+};
+
+class LocalMapper {
+ public:
+  /// Forgets everything; the robot starts at the given pose.
+  virtual void reset(const Pose2& session_T_base) = 0;
+
+  /// Takes the next scan. bad_data: an odometry that is not finite, a laser that is not configured, a wrong number of
+  /// ranges; the scan is then ignored. Cost bounded by the configuration.
+  virtual Result<ScanOutcome> add(const Scan& scan) = 0;
+
+  virtual Pose2 pose() const = 0;
+  /// Covariance of pose() against the live map, in the robot's own frame.
+  virtual Sym3 covariance() const = 0;
+  /// The live map round the robot.
+  virtual const CountingGrid& live_map() const = 0;
+  virtual float cell_m() const = 0;
+
+  /// The scans in memory: [first_remembered(), scans().end()) are in the live map; older ones that scans() still holds
+  /// wait to be rendered.
+  virtual const ScanMemory& scans() const = 0;
+  virtual std::uint32_t first_remembered() const = 0;
+  /// Where the robot was at a scan that scans() holds, as the best hypothesis has it now.
+  virtual Pose2 scan_pose(std::uint32_t number) const = 0;
+  virtual const MapperStatistics& statistics() const = 0;
+
+ protected:
+  ~LocalMapper() = default;
+};
+
+}  // namespace mellin

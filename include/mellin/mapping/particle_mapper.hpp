@@ -1,0 +1,127 @@
+// GMapping with forgetting (Grisetti, Stachniss, Burgard 2007; paper, Section III-A): a Rao-Blackwellised particle
+// filter in which each particle carries its own live grid and the poses of the remembered scans, and the oldest scan is
+// subtracted from every grid when the memory is full. With one particle it is a scan matcher without sampling.
+#pragma once
+
+#include <cstdint>
+
+#include "mellin/core/arena.hpp"
+#include "mellin/core/random.hpp"
+#include "mellin/mapping/live_grid.hpp"
+#include "mellin/mapping/local_mapper.hpp"
+#include "mellin/mapping/scan_matcher.hpp"
+
+namespace mellin {
+
+/// Odometry error of one step, as standard deviations: distance driven d [m], turn a [rad].
+struct MotionNoise {
+  float distance_base_m = 0.02F;   ///< along and across, always
+  float distance_per_m = 0.10F;    ///< along and across, times d
+  float distance_per_rad = 0.05F;  ///< along and across, times a
+  float angle_base_rad = 0.01F;    ///< heading, always
+  float angle_per_m = 0.05F;       ///< heading, times d
+  float angle_per_rad = 0.15F;     ///< heading, times a
+};
+
+struct ParticleMapperConfig {
+  std::uint16_t particles = 10;
+  std::uint16_t remembered_scans = 40;  ///< K: the live map is the sum of this many scans
+  std::uint16_t spare_scans = 12;       ///< kept beyond K, so that a submap can be rendered while scans come in
+  std::uint16_t side = 768;             ///< cells of the window; even
+  float cell_m = 0.05F;
+  float take_distance_m = 0.5F;         ///< a scan is taken when odometry says so much straight-line distance …
+  float take_angle_rad = 0.523598776F;  ///< … or so much turn since the last taken one
+  float resample_share = 0.5F;          ///< resample when the effective number of particles falls below this share
+  float proposal_spread = 0.3F;         ///< share of the match's standard deviation that sampling uses
+  std::uint16_t max_beams = 0;          ///< of any laser
+  ScanMatcherConfig matcher;
+  MotionNoise noise;
+};
+
+class ParticleMapper final : public LocalMapper {
+ public:
+  struct Particle {
+    LiveGrid grid;
+    Pose2 pose;               ///< at the newest taken scan
+    double log_weight = 0.0;  ///< since the last resampling, relative
+    Sym3 information;         ///< of the last match
+    bool matched = false;
+    std::uint16_t offspring = 0;  ///< scratch of resampling: copies drawn of it
+  };
+  struct Memory {
+    ScanMemory::Memory scans;
+    ScanMatcher::Memory matcher;
+    LiveGrid::Memory grids;
+    Span<Particle> particles;
+    Span<Pose2> poses;     ///< particle by particle, a ring by scan number
+    Span<CellRect> rects;  ///< the part of the window that each scan has been continuously inside
+  };
+  template <class A>
+  static constexpr Memory carve(A& arena, const ParticleMapperConfig& config) {
+    const std::size_t capacity = std::size_t{config.remembered_scans} + config.spare_scans;
+    return {ScanMemory::carve(arena, scan_memory_config(config)),
+            ScanMatcher::carve(arena, matcher_config(config)),
+            LiveGrid::carve(arena, config.side, config.particles),
+            arena.template take<Particle>(config.particles, Part::mapper),
+            arena.template take<Pose2>(capacity * config.particles, Part::mapper),
+            arena.template take<CellRect>(std::size_t{config.remembered_scans} * config.particles, Part::mapper)};
+  }
+
+  ParticleMapper() = default;
+  /// `lasers` has kMaxLasers elements and stays the caller's.
+  ParticleMapper(const ParticleMapperConfig& config, const Memory& memory, Span<const LaserConfig> lasers,
+                 std::uint64_t seed);
+
+  void reset(const Pose2& session_T_base) override;
+  Result<ScanOutcome> add(const Scan& scan) override;
+  Pose2 pose() const override { return tracked_; }
+  Sym3 covariance() const override;
+  const CountingGrid& live_map() const override { return memory_.particles[best_].grid.grid(); }
+  float cell_m() const override { return config_.cell_m; }
+  const ScanMemory& scans() const override { return scans_; }
+  std::uint32_t first_remembered() const override {
+    return scans_.end() > config_.remembered_scans ? scans_.end() - config_.remembered_scans : 0;
+  }
+  Pose2 scan_pose(std::uint32_t number) const override { return poses(best_)[number % pose_capacity()]; }
+  const MapperStatistics& statistics() const override { return statistics_; }
+
+ private:
+  static constexpr ScanMemoryConfig scan_memory_config(const ParticleMapperConfig& config) {
+    return {static_cast<std::uint16_t>(config.remembered_scans + config.spare_scans), config.max_beams};
+  }
+  static constexpr ScanMatcherConfig matcher_config(const ParticleMapperConfig& config) {
+    ScanMatcherConfig matcher = config.matcher;
+    matcher.max_points = config.max_beams;
+    return matcher;
+  }
+  std::size_t pose_capacity() const { return std::size_t{config_.remembered_scans} + config_.spare_scans; }
+  Span<Pose2> poses(std::size_t particle) const {
+    return memory_.poses.subspan(particle * pose_capacity(), pose_capacity());
+  }
+  Span<CellRect> rects(std::size_t particle) const {
+    return memory_.rects.subspan(particle * config_.remembered_scans, config_.remembered_scans);
+  }
+
+  bool acceptable(const Scan& scan) const;
+  Sym3 prior_information(const Pose2& motion) const;
+  ScanUse track(const Pose2& predicted, const Sym3& prior);
+  bool take(const Pose2& predicted, const Sym3& prior);
+  bool propose(std::size_t particle, const Pose2& predicted, const Sym3& prior);
+  void remember(std::size_t particle, std::uint32_t number);
+  void resample_if_poor();
+
+  ParticleMapperConfig config_;
+  Memory memory_;
+  Span<const LaserConfig> lasers_;
+  ScanMemory scans_;
+  ScanMatcher matcher_;
+  std::uint64_t seed_ = 0;
+  MapperStatistics statistics_;
+  std::size_t best_ = 0;
+  Pose2 tracked_;  ///< live pose at the newest scan, taken or not
+  Sym3 tracked_information_;
+  Pose2 last_odometry_;   ///< at the newest scan
+  Pose2 taken_odometry_;  ///< at the newest taken scan
+};
+
+}  // namespace mellin

@@ -1,0 +1,80 @@
+// Scan matching on the endpoint model (Grisetti, Stachniss, Burgard 2007, Section III): a pose is good where the ends
+// of the beams lie on what the live grid holds for solid. Two steps: a correlative search over the poses that the
+// odometry leaves open (Olson 2009), then Gauss-Newton on the likelihood field with the odometry as prior, so that
+// directions which the scan does not determine (along a corridor) are left to the odometry.
+#pragma once
+
+#include <cstdint>
+
+#include "mellin/core/arena.hpp"
+#include "mellin/core/se2.hpp"
+#include "mellin/mapping/live_grid.hpp"
+
+namespace mellin {
+
+struct ScanMatcherConfig {
+  std::uint16_t max_points = 0;      ///< beams of any laser
+  std::uint16_t search_points = 72;  ///< beams used by the correlative search, evenly chosen
+  float search_distance_m = 0.5F;    ///< half-width of the search along x and y
+  float search_angle_rad = 0.35F;    ///< half-width of the search in heading
+  float search_angle_step_rad = 0.0174532925F;
+  std::uint16_t max_iterations = 12;  ///< of Gauss-Newton
+  /// Weight of the whole scan: what it costs, in units of one half chi-squared, if every beam ends in free space. Beams
+  /// of one scan share their errors, so it is far below the number of beams.
+  float scan_weight = 120.0F;
+  float min_inlier_share = 0.35F;  ///< of the beams must end near something solid for a match to count
+};
+
+struct MatchResult {
+  Pose2 pose;          ///< of the base, in the frame of the grid
+  Sym3 information;    ///< of the pose in its own frame (m, m, rad), prior included
+  float score = 0.0F;  ///< mean of the field at the beams' ends, 0 to 1
+  float inlier_share = 0.0F;
+  bool converged = false;  ///< whether the last step was below a tenth of a millimetre and of a milliradian
+  bool good = false;       ///< inlier_share suffices
+};
+
+class ScanMatcher {
+ public:
+  /// A search point's cell for one heading, relative to the robot's.
+  struct CellOffset {
+    std::int16_t column = 0;
+    std::int16_t row = 0;
+  };
+  struct Memory {
+    Span<Point2f> points;
+    Span<CellOffset> offsets;
+  };
+  template <class A>
+  static constexpr Memory carve(A& arena, const ScanMatcherConfig& config) {
+    return {arena.template take<Point2f>(config.max_points, Part::mapper, Region::fast),
+            arena.template take<CellOffset>(config.search_points, Part::mapper, Region::fast)};
+  }
+
+  ScanMatcher() = default;
+  ScanMatcher(const ScanMatcherConfig& config, const Memory& memory) : config_(config), memory_(memory) {}
+
+  /// Takes the points of a scan, in the base frame. Ranges as the scan memory stores them, one a direction (unit
+  /// vectors in the base frame); `base_T_laser` is where the beams start. Returns how many beams measured something.
+  std::size_t set_scan(Span<const StoredRange> ranges, Span<const Point2f> directions, const Pose2& base_T_laser,
+                       float cell_m);
+
+  /// Gauss-Newton from `start`. `prior` is the predicted pose, `prior_information` its information in its own frame.
+  /// Cost: max_iterations x points x 4 cells.
+  MatchResult refine(const LiveGrid& grid, const Pose2& start, const Pose2& prior, const Sym3& prior_information) const;
+
+  /// Correlative search round the prior, then refine() from the best pose found and from the prior itself; the better
+  /// one counts. Cost: (2 search_distance / (2 cells))^2 x angles x search_points cells.
+  MatchResult search(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const;
+
+ private:
+  struct Linearised;
+  Linearised linearise(const LiveGrid& grid, const GridPose& at, float x, float y, float theta) const;
+  Pose2 correlate(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const;
+
+  ScanMatcherConfig config_;
+  Memory memory_;
+  std::size_t count_ = 0;  ///< points of the scan, in cells
+};
+
+}  // namespace mellin

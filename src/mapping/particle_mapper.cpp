@@ -1,0 +1,282 @@
+#include "mellin/mapping/particle_mapper.hpp"
+
+namespace mellin {
+namespace {
+
+double wide(float value) { return static_cast<double>(value); }
+
+double magnitude(double value) { return value < 0.0 ? -value : value; }
+
+/// Draws from a normal distribution of the given covariance (Cholesky factor times standard normals).
+Pose2 draw(const Sym3& covariance, Random& random) {
+  const double u = random.normal();
+  const double v = random.normal();
+  const double w = random.normal();
+  const double a = sqrt(covariance.xx);
+  const double b = covariance.xy / a;
+  const double c = covariance.xt / a;
+  const double d = sqrt(covariance.yy - b * b > 0.0 ? covariance.yy - b * b : 0.0);
+  const double e = d > 0.0 ? (covariance.yt - b * c) / d : 0.0;
+  const double rest = covariance.tt - c * c - e * e;
+  return {a * u, b * u + d * v, c * u + e * v + sqrt(rest > 0.0 ? rest : 0.0) * w};
+}
+
+}  // namespace
+
+ParticleMapper::ParticleMapper(const ParticleMapperConfig& config, const Memory& memory, Span<const LaserConfig> lasers,
+                               std::uint64_t seed)
+    : config_(config),
+      memory_(memory),
+      lasers_(lasers),
+      scans_(scan_memory_config(config), memory.scans, lasers),
+      matcher_(matcher_config(config), memory.matcher),
+      seed_(seed) {
+  const std::size_t cells = std::size_t{config.side} * config.side;
+  for (std::size_t p = 0; p < config.particles; ++p) {
+    memory_.particles[p].grid = LiveGrid(memory.grids.cells.subspan(p * cells, cells),
+                                         memory.grids.field.subspan(p * cells, cells), config.side, config.cell_m);
+  }
+  reset({});
+}
+
+void ParticleMapper::reset(const Pose2& session_T_base) {
+  scans_.clear();
+  best_ = 0;
+  tracked_ = session_T_base;
+  tracked_information_ = prior_information({});
+  for (Particle& particle : memory_.particles) {
+    particle.grid.reset(session_T_base);
+    particle.pose = session_T_base;
+    particle.log_weight = 0.0;
+    particle.information = tracked_information_;
+  }
+}
+
+bool ParticleMapper::acceptable(const Scan& scan) const {
+  return scan.laser < kMaxLasers && lasers_[scan.laser].beams > 0 &&
+         scan.ranges_m.size() == lasers_[scan.laser].beams && is_finite(scan.odom_T_base) &&
+         magnitude(scan.odom_T_base.x) < 1e6 && magnitude(scan.odom_T_base.y) < 1e6 &&
+         magnitude(scan.odom_T_base.theta) < 1e6;
+}
+
+Sym3 ParticleMapper::prior_information(const Pose2& motion) const {
+  const MotionNoise& noise = config_.noise;
+  const double distance = translation(motion);
+  const double turn = magnitude(motion.theta);
+  const double along =
+      wide(noise.distance_base_m) + wide(noise.distance_per_m) * distance + wide(noise.distance_per_rad) * turn;
+  const double heading =
+      wide(noise.angle_base_rad) + wide(noise.angle_per_m) * distance + wide(noise.angle_per_rad) * turn;
+  return diagonal(1.0 / (along * along), 1.0 / (along * along), 1.0 / (heading * heading));
+}
+
+Result<ScanOutcome> ParticleMapper::add(const Scan& scan) {
+  ++statistics_.scans;
+  if (!acceptable(scan)) {
+    ++statistics_.refused;
+    return Status::bad_data;
+  }
+  const bool first = scans_.end() == 0;
+  const Pose2 motion = first ? Pose2{} : between(last_odometry_, scan.odom_T_base);
+  const Pose2 since_taken = first ? Pose2{} : between(taken_odometry_, scan.odom_T_base);
+  const Pose2 predicted = compose(tracked_, motion);
+  last_odometry_ = scan.odom_T_base;
+  scans_.stage(scan);
+  (void)matcher_.set_scan(scans_.ranges(scans_.end()), scans_.directions(scans_.end()),
+                          lasers_[scan.laser].base_T_laser, config_.cell_m);
+
+  ScanOutcome outcome;
+  outcome.taken = first || translation(since_taken) >= wide(config_.take_distance_m) ||
+                  magnitude(since_taken.theta) >= wide(config_.take_angle_rad);
+  const Sym3 prior = prior_information(motion);
+  if (outcome.taken) {
+    taken_odometry_ = scan.odom_T_base;
+    outcome.use = take(predicted, prior) ? ScanUse::taken : ScanUse::odometry;
+    ++statistics_.taken;
+  } else {
+    outcome.use = track(predicted, prior);
+  }
+  statistics_.unmatched += outcome.use == ScanUse::odometry ? 1U : 0U;
+  outcome.session_T_base = tracked_;
+  outcome.anchor_scan = scans_.end() - 1;
+  outcome.anchor_T_base = between(scan_pose(outcome.anchor_scan), tracked_);
+  return outcome;
+}
+
+ScanUse ParticleMapper::track(const Pose2& predicted, const Sym3& prior) {
+  const LiveGrid& grid = memory_.particles[best_].grid;
+  MatchResult match = matcher_.refine(grid, predicted, predicted, prior);
+  if (!match.good) {
+    match = matcher_.search(grid, predicted, prior);
+  }
+  tracked_ = match.good ? match.pose : predicted;
+  tracked_information_ = match.good ? match.information : prior;
+  return match.good ? ScanUse::matched : ScanUse::odometry;
+}
+
+bool ParticleMapper::take(const Pose2& predicted, const Sym3& prior) {
+  const std::uint32_t number = scans_.end();
+  const Pose2 best_before = memory_.particles[best_].pose;
+  bool any_matched = number == 0;
+  for (std::size_t p = 0; p < config_.particles; ++p) {
+    // What was learnt of the motion between the taken scans holds for every particle.
+    const Pose2 own = p == best_ ? predicted : compose(memory_.particles[p].pose, between(best_before, predicted));
+    any_matched |= propose(p, own, prior);
+  }
+  (void)scans_.take_staged();
+  for (std::size_t p = 0; p < config_.particles; ++p) {
+    remember(p, number);
+  }
+  best_ = 0;
+  for (std::size_t p = 1; p < config_.particles; ++p) {
+    best_ = memory_.particles[p].log_weight > memory_.particles[best_].log_weight ? p : best_;
+  }
+  tracked_ = memory_.particles[best_].pose;
+  tracked_information_ = memory_.particles[best_].information;
+  const bool matched = any_matched && (number == 0 || memory_.particles[best_].matched);
+  if (config_.particles > 1) {
+    resample_if_poor();
+  }
+  return matched;
+}
+
+bool ParticleMapper::propose(std::size_t index, const Pose2& predicted, const Sym3& prior) {
+  Particle& particle = memory_.particles[index];
+  particle.matched = false;
+  if (scans_.end() == 0) {
+    particle.pose = predicted;
+    return true;
+  }
+  Random random(seed_, std::uint64_t{scans_.end()} * config_.particles + index);
+  Sym3 covariance;
+  Pose2 start = predicted;
+  if (config_.particles > 1 && invert(prior, covariance)) {
+    start = compose(predicted, draw(covariance, random));  // the motion model
+  }
+  const MatchResult match = matcher_.search(particle.grid, start, prior);
+  particle.matched = match.good;
+  if (!match.good) {
+    particle.pose = start;
+    particle.information = prior;
+    particle.log_weight += wide(config_.matcher.scan_weight * match.score);
+    return false;
+  }
+  particle.pose = match.pose;
+  particle.information = match.information;
+  if (config_.particles > 1 && invert(match.information, covariance)) {
+    // The improved proposal: a Gaussian round the match, narrower than the motion model.
+    const double spread = wide(config_.proposal_spread);
+    particle.pose = compose(match.pose, draw(scale(covariance, spread * spread), random));
+  }
+  const Pose2 off = between(predicted, match.pose);
+  particle.log_weight += wide(config_.matcher.scan_weight * match.score) - 0.5 * quadratic_form(prior, off);
+  return true;
+}
+
+void ParticleMapper::remember(std::size_t index, std::uint32_t number) {
+  Particle& particle = memory_.particles[index];
+  const Span<Pose2> scan_poses = poses(index);
+  const Span<CellRect> scan_rects = rects(index);
+  const std::uint32_t k = config_.remembered_scans;
+  if (number >= k) {
+    const std::uint32_t oldest = number - k;
+    particle.grid.remove(scans_, oldest, scan_poses[oldest % pose_capacity()], scan_rects[oldest % k]);
+  }
+  if (particle.grid.off_centre(particle.pose) > config_.side / 12) {
+    particle.grid.roll_to(particle.pose);
+    for (CellRect& rect : scan_rects) {
+      rect = intersection(rect, particle.grid.grid().window());
+    }
+  }
+  scan_poses[number % pose_capacity()] = particle.pose;
+  scan_rects[number % k] = particle.grid.grid().window();
+  particle.grid.add(scans_, number, particle.pose, scan_rects[number % k]);
+}
+
+void ParticleMapper::resample_if_poor() {
+  const std::size_t n = config_.particles;
+  const double top = memory_.particles[best_].log_weight;
+  double sum = 0.0;
+  double squares = 0.0;
+  for (Particle& particle : memory_.particles) {
+    particle.log_weight -= top;
+    const double weight = exp(particle.log_weight);
+    sum += weight;
+    squares += weight * weight;
+  }
+  if (sum * sum >= wide(config_.resample_share) * static_cast<double>(n) * squares) {
+    return;
+  }
+  ++statistics_.resampled;
+  // Low-variance resampling (Thrun, Burgard, Fox 2005, Table 4.4), sorted so that survivors stay in place.
+  Random random(seed_, ~std::uint64_t{scans_.end()});
+  const double step = sum / static_cast<double>(n);
+  double target = random.uniform() * step;
+  double reached = 0.0;
+  std::size_t drawn = 0;
+  for (Particle& particle : memory_.particles) {
+    reached += exp(particle.log_weight);
+    particle.offspring = 0;
+    while (drawn < n && target < reached) {
+      ++particle.offspring;
+      ++drawn;
+      target += step;
+    }
+  }
+  memory_.particles[n - 1].offspring = static_cast<std::uint16_t>(memory_.particles[n - 1].offspring + (n - drawn));
+  std::size_t source = 0;
+  for (std::size_t p = 0; p < n; ++p) {
+    Particle& dead = memory_.particles[p];
+    if (dead.offspring > 0) {
+      continue;
+    }
+    while (memory_.particles[source].offspring < 2) {
+      ++source;
+    }
+    Particle& alive = memory_.particles[source];
+    --alive.offspring;
+    dead.offspring = 1;
+    dead.grid.copy_from(alive.grid);
+    dead.pose = alive.pose;
+    dead.information = alive.information;
+    dead.matched = alive.matched;
+    for (std::size_t i = 0; i < pose_capacity(); ++i) {
+      poses(p)[i] = poses(source)[i];
+    }
+    for (std::size_t i = 0; i < config_.remembered_scans; ++i) {
+      rects(p)[i] = rects(source)[i];
+    }
+  }
+  for (Particle& particle : memory_.particles) {
+    particle.log_weight = 0.0;
+  }
+  // The best particle survives: its share of the weight is the largest. Where it lies now is its own place.
+}
+
+Sym3 ParticleMapper::covariance() const {
+  Sym3 spread;
+  if (!invert(tracked_information_, spread)) {
+    spread = diagonal(1.0, 1.0, 1.0);
+  }
+  if (config_.particles < 2) {
+    return spread;
+  }
+  double total = 0.0;
+  double xx = 0.0;
+  double yy = 0.0;
+  double xy = 0.0;
+  double tt = 0.0;
+  const Pose2 best = memory_.particles[best_].pose;
+  for (const Particle& particle : memory_.particles) {
+    const double weight = exp(particle.log_weight);
+    const Pose2 off = between(best, particle.pose);
+    total += weight;
+    xx += weight * off.x * off.x;
+    xy += weight * off.x * off.y;
+    yy += weight * off.y * off.y;
+    tt += weight * off.theta * off.theta;
+  }
+  return spread + scale({xx, xy, 0.0, yy, 0.0, tt}, 1.0 / total);
+}
+
+}  // namespace mellin

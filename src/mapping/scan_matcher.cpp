@@ -1,0 +1,234 @@
+#include "mellin/mapping/scan_matcher.hpp"
+
+namespace mellin {
+namespace {
+
+constexpr std::int32_t kSearchStep = 2;  // cells: within the reach of the field
+constexpr float kInlierField = 0.4F;     // the field one to two cells from something solid
+
+/// The field between the centres of four cells, 0 to 1, and its slope per cell.
+struct Sample {
+  float value;
+  float dx;
+  float dy;
+};
+
+Sample sample(const LiveGrid& grid, std::int32_t column, std::int32_t row, float x_cells, float y_cells) {
+  const float u = x_cells - 0.5F;
+  const float v = y_cells - 0.5F;
+  const std::int32_t c = floor_cell(u);
+  const std::int32_t r = floor_cell(v);
+  const float fx = u - static_cast<float>(c);
+  const float fy = v - static_cast<float>(r);
+  const float f00 = grid.field(column + c, row + r);
+  const float f10 = grid.field(column + c + 1, row + r);
+  const float f01 = grid.field(column + c, row + r + 1);
+  const float f11 = grid.field(column + c + 1, row + r + 1);
+  constexpr float kScale = 1.0F / 255.0F;
+  const float low = f00 + fx * (f10 - f00);
+  const float high = f01 + fx * (f11 - f01);
+  return {kScale * (low + fy * (high - low)), kScale * ((f10 - f00) + fy * ((f11 - f01) - (f10 - f00))),
+          kScale * (high - low)};
+}
+
+/// Solves a positive definite 3 x 3 system M s = v. Returns false where M is not positive definite.
+bool solve(const Sym3& m, const Pose2& v, Pose2& s) {
+  Sym3 inv;
+  if (!invert(m, inv)) {
+    return false;
+  }
+  s = {inv.xx * v.x + inv.xy * v.y + inv.xt * v.theta, inv.xy * v.x + inv.yy * v.y + inv.yt * v.theta,
+       inv.xt * v.x + inv.yt * v.y + inv.tt * v.theta};
+  return true;
+}
+
+}  // namespace
+
+struct ScanMatcher::Linearised {
+  Sym3 hessian;       // of sum (1 - field)^2 over the points, in cells and rad, axes of the grid
+  Pose2 gradient;     // towards smaller cost
+  float cost = 0.0F;  // sum (1 - field)^2
+  float sum = 0.0F;   // of the field
+  std::size_t inliers = 0;
+};
+
+std::size_t ScanMatcher::set_scan(Span<const StoredRange> ranges, Span<const Point2f> directions,
+                                  const Pose2& base_T_laser, float cell_m) {
+  count_ = 0;
+  const float inverse_cell = 1.0F / cell_m;
+  const float mount_x = static_cast<float>(base_T_laser.x) * inverse_cell;
+  const float mount_y = static_cast<float>(base_T_laser.y) * inverse_cell;
+  const float step = kRangeStep_m * inverse_cell;
+  for (std::size_t i = 0; i < ranges.size() && count_ < memory_.points.size(); ++i) {
+    if (ranges[i] != 0) {
+      const float length = static_cast<float>(ranges[i]) * step;
+      memory_.points[count_++] = {mount_x + directions[i].x * length, mount_y + directions[i].y * length};
+    }
+  }
+  return count_;
+}
+
+ScanMatcher::Linearised ScanMatcher::linearise(const LiveGrid& grid, const GridPose& at, float x, float y,
+                                               float theta) const {
+  Linearised out;
+  const SinCosF turn = sincos(theta);
+  const float c = at.cos * turn.cos - at.sin * turn.sin;
+  const float s = at.sin * turn.cos + at.cos * turn.sin;
+  const float px = at.x_cells + x;
+  const float py = at.y_cells + y;
+  float hxx = 0.0F, hxy = 0.0F, hxt = 0.0F, hyy = 0.0F, hyt = 0.0F, htt = 0.0F, gx = 0.0F, gy = 0.0F, gt = 0.0F;
+  for (std::size_t i = 0; i < count_; ++i) {
+    const Point2f q = memory_.points[i];
+    const float rx = c * q.x - s * q.y;
+    const float ry = s * q.x + c * q.y;
+    const Sample f = sample(grid, at.column, at.row, px + rx, py + ry);
+    const float residual = 1.0F - f.value;
+    const float ft = f.dy * rx - f.dx * ry;
+    out.cost += residual * residual;
+    out.sum += f.value;
+    out.inliers += f.value > kInlierField ? 1U : 0U;
+    hxx += f.dx * f.dx;
+    hxy += f.dx * f.dy;
+    hxt += f.dx * ft;
+    hyy += f.dy * f.dy;
+    hyt += f.dy * ft;
+    htt += ft * ft;
+    gx += residual * f.dx;
+    gy += residual * f.dy;
+    gt += residual * ft;
+  }
+  const auto d = [](float value) { return static_cast<double>(value); };
+  out.hessian = {d(hxx), d(hxy), d(hxt), d(hyy), d(hyt), d(htt)};
+  out.gradient = {d(gx), d(gy), d(gt)};
+  return out;
+}
+
+MatchResult ScanMatcher::refine(const LiveGrid& grid, const Pose2& start, const Pose2& prior,
+                                const Sym3& prior_information) const {
+  MatchResult result;
+  result.pose = start;
+  if (count_ == 0) {
+    result.information = prior_information;
+    return result;
+  }
+  const auto cell = static_cast<double>(grid.cell_m());
+  const GridPose at = grid_pose(start, grid.cell_m());
+  // Everything below in cells and along the grid's axes. The scan's cost is scan_weight * mean (1 - field)^2.
+  const Sym3 rotated = rotate(prior_information, prior.theta);
+  const Sym3 stiffness{rotated.xx * cell * cell, rotated.xy * cell * cell, rotated.xt * cell,
+                       rotated.yy * cell * cell, rotated.yt * cell,        rotated.tt};
+  const Pose2 off{(start.x - prior.x) / cell, (start.y - prior.y) / cell, wrap_angle(start.theta - prior.theta)};
+  const double weight = static_cast<double>(config_.scan_weight) / static_cast<double>(count_);
+  const auto total = [&](const Linearised& scan, const Pose2& moved) {
+    const Pose2 e{off.x + moved.x, off.y + moved.y, off.theta + moved.theta};
+    return weight * static_cast<double>(scan.cost) + 0.5 * quadratic_form(stiffness, e);
+  };
+  Pose2 moved;
+  const auto linearise_at = [&](const Pose2& m) {
+    return linearise(grid, at, static_cast<float>(m.x), static_cast<float>(m.y), static_cast<float>(m.theta));
+  };
+  Linearised here = linearise_at(moved);
+  double cost = total(here, moved);
+  double damping = 0.0;
+  for (std::uint16_t i = 0; i < config_.max_iterations; ++i) {
+    const Pose2 e{off.x + moved.x, off.y + moved.y, off.theta + moved.theta};
+    Sym3 h = scale(here.hessian, 2.0 * weight) + stiffness;
+    h.xx += damping * h.xx + 1e-9;
+    h.yy += damping * h.yy + 1e-9;
+    h.tt += damping * h.tt + 1e-9;
+    const Pose2 g{
+        2.0 * weight * here.gradient.x - (stiffness.xx * e.x + stiffness.xy * e.y + stiffness.xt * e.theta),
+        2.0 * weight * here.gradient.y - (stiffness.xy * e.x + stiffness.yy * e.y + stiffness.yt * e.theta),
+        2.0 * weight * here.gradient.theta - (stiffness.xt * e.x + stiffness.yt * e.y + stiffness.tt * e.theta)};
+    Pose2 step;
+    if (!solve(h, g, step)) {
+      break;
+    }
+    const Pose2 next{moved.x + step.x, moved.y + step.y, moved.theta + step.theta};
+    const Linearised there = linearise_at(next);
+    const double next_cost = total(there, next);
+    if (next_cost <= cost) {
+      moved = next;
+      here = there;
+      cost = next_cost;
+      damping *= 0.1;
+      if (step.x * step.x + step.y * step.y < 4e-6 && step.theta * step.theta < 1e-8) {
+        result.converged = true;
+        break;
+      }
+    } else {
+      damping = damping == 0.0 ? 0.1 : 10.0 * damping;
+      if (damping > 1e4) {
+        result.converged = true;  // no descent left at the field's resolution
+        break;
+      }
+    }
+  }
+  result.pose = {start.x + moved.x * cell, start.y + moved.y * cell, wrap_angle(start.theta + moved.theta)};
+  const Sym3 h = scale(here.hessian, 2.0 * weight) + stiffness;
+  const Sym3 metric{h.xx / (cell * cell), h.xy / (cell * cell), h.xt / cell, h.yy / (cell * cell), h.yt / cell, h.tt};
+  result.information = rotate(metric, -result.pose.theta);
+  result.score = here.sum / static_cast<float>(count_);
+  result.inlier_share = static_cast<float>(here.inliers) / static_cast<float>(count_);
+  result.good = result.inlier_share >= config_.min_inlier_share;
+  return result;
+}
+
+Pose2 ScanMatcher::correlate(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const {
+  const float cell = grid.cell_m();
+  const GridPose at = grid_pose(prior, cell);
+  const auto reach = static_cast<std::int32_t>(config_.search_distance_m / cell) / kSearchStep;
+  const auto turns = static_cast<std::int32_t>(config_.search_angle_rad / config_.search_angle_step_rad);
+  const std::size_t stride =
+      count_ > config_.search_points ? (count_ + config_.search_points - 1) / config_.search_points : 1;
+  const std::size_t used = (count_ + stride - 1) / stride;
+  const auto per_point = static_cast<double>(config_.scan_weight) / static_cast<double>(used * 255);
+  const Sym3 stiffness = rotate(prior_information, prior.theta);
+  const auto step_m = static_cast<double>(kSearchStep) * static_cast<double>(cell);
+  double best = -1e300;
+  Pose2 best_pose = prior;
+  for (std::int32_t turn = -turns; turn <= turns; ++turn) {
+    const auto theta = static_cast<float>(turn) * config_.search_angle_step_rad;
+    const SinCosF r = sincos(theta);
+    const float c = at.cos * r.cos - at.sin * r.sin;
+    const float s = at.sin * r.cos + at.cos * r.sin;
+    for (std::size_t i = 0; i < used; ++i) {
+      const Point2f q = memory_.points[i * stride];
+      memory_.offsets[i] = {static_cast<std::int16_t>(floor_cell(at.x_cells + c * q.x - s * q.y)),
+                            static_cast<std::int16_t>(floor_cell(at.y_cells + s * q.x + c * q.y))};
+    }
+    for (std::int32_t dy = -reach; dy <= reach; ++dy) {
+      for (std::int32_t dx = -reach; dx <= reach; ++dx) {
+        // The prior's share first: it bounds what this pose can reach.
+        const double penalty = 0.5 * quadratic_form(stiffness, {dx * step_m, dy * step_m, static_cast<double>(theta)});
+        if (static_cast<double>(config_.scan_weight) - penalty <= best) {
+          continue;
+        }
+        const std::int32_t column = at.column + kSearchStep * dx;
+        const std::int32_t row = at.row + kSearchStep * dy;
+        std::uint32_t sum = 0;
+        for (std::size_t i = 0; i < used; ++i) {
+          sum += grid.field(column + memory_.offsets[i].column, row + memory_.offsets[i].row);
+        }
+        const double score = per_point * static_cast<double>(sum) - penalty;
+        if (score > best) {
+          best = score;
+          best_pose = {prior.x + dx * step_m, prior.y + dy * step_m, prior.theta + static_cast<double>(theta)};
+        }
+      }
+    }
+  }
+  return best_pose;
+}
+
+MatchResult ScanMatcher::search(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const {
+  const MatchResult near = refine(grid, prior, prior, prior_information);
+  const MatchResult far = refine(grid, correlate(grid, prior, prior_information), prior, prior_information);
+  const auto value = [&](const MatchResult& m) {
+    const Pose2 e = between(prior, m.pose);
+    return static_cast<double>(config_.scan_weight * m.score) - 0.5 * quadratic_form(prior_information, e);
+  };
+  return value(far) > value(near) ? far : near;
+}
+
+}  // namespace mellin
