@@ -1,0 +1,81 @@
+// Submaps (paper, Section III-B): the remembered scans, rendered afresh into an occupancy grid that is centred where
+// they lie. Cutting them out of the live window would lose what the robot saw before it moved on.
+#pragma once
+
+#include <cstdint>
+
+#include "mellin/core/arena.hpp"
+#include "mellin/core/status.hpp"
+#include "mellin/grid/counting_grid.hpp"
+#include "mellin/grid/submap.hpp"
+#include "mellin/mapping/local_mapper.hpp"
+
+namespace mellin {
+
+struct SubmapBuilderConfig {
+  std::uint16_t max_scans = 40;  ///< K: rendered into one submap at most, the newest ones …
+  float max_path_m = 20.0F;      ///< … that lie within so much driven path: what is longer warps, and leaves the grid
+  std::uint16_t every_scans = 10;  ///< a submap is due after so many new scans (the paper's K/4) …
+  float every_path_m = 10.0F;      ///< … or so much path: half of max_path_m keeps neighbours overlapping
+  std::uint16_t side = 768;        ///< cells of the grid; even
+  float cell_m = 0.05F;
+  std::uint16_t band_rows = 32;  ///< rows rendered in one slice; memory in proportion
+};
+
+/// Renders one submap at a time, band by band. The scans it renders must stay in the scan memory until it is done.
+class SubmapBuilder {
+ public:
+  struct Memory {
+    Span<CellCount> band;
+    Span<Pose2> poses;
+  };
+  template <class A>
+  static constexpr Memory carve(A& arena, const SubmapBuilderConfig& config) {
+    return {arena.template take<CellCount>(std::size_t{config.band_rows} * config.side, Part::submaps),
+            arena.template take<Pose2>(config.max_scans, Part::submaps)};
+  }
+
+  SubmapBuilder() = default;
+  SubmapBuilder(const SubmapBuilderConfig& config, const Memory& memory) : config_(config), memory_(memory) {}
+
+  /// A new session: counts path and scans from here.
+  void reset();
+  /// To be told of each taken scan. Returns whether a submap is due: the memory has been filled once (with scans or
+  /// with path), and since the last submap enough is new.
+  bool scan_taken(const Pose2& session_T_base);
+  /// Whether scans were taken that no submap holds yet.
+  bool has_unfrozen() const { return new_scans_ > 0; }
+
+  /// Freezes the newest scans: takes over their poses and fills in the header (all but id and session). Rendering into
+  /// `cells` (side * side) follows in steps. busy: a submap is being rendered. degenerate: no scan was taken.
+  Status begin(const LocalMapper& mapper, Span<std::uint8_t> cells, SubmapHeader& header);
+  /// Renders the next band. Returns true when the grid is complete. not_found: a scan has left the memory meanwhile;
+  /// the submap is lost. Cost: band_rows x side cells, and the beams of max_scans scans clipped to them.
+  Result<bool> step(const ScanMemory& scans);
+  bool active() const { return active_; }
+  void abort() { active_ = false; }
+
+  /// The frozen scans: numbers from first_scan(), and their poses in the submap's frame. Valid from begin() until the
+  /// next begin().
+  std::uint32_t first_scan() const { return first_scan_; }
+  Span<const Pose2> submap_T_scan() const { return memory_.poses.first(scan_count_); }
+
+ private:
+  std::uint32_t scans_in_path(const LocalMapper& mapper) const;
+
+  SubmapBuilderConfig config_;
+  Memory memory_;
+  Span<std::uint8_t> cells_;
+  bool active_ = false;
+  std::uint16_t next_row_ = 0;
+  std::uint32_t first_scan_ = 0;
+  std::uint32_t scan_count_ = 0;
+  std::uint32_t taken_ = 0;      ///< scans of the session
+  std::uint32_t new_scans_ = 0;  ///< since the last submap
+  double path_m_ = 0.0;          ///< of the session
+  double new_path_m_ = 0.0;      ///< since the last submap
+  Pose2 last_pose_;
+  bool any_frozen_ = false;
+};
+
+}  // namespace mellin

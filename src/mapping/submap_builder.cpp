@@ -1,0 +1,112 @@
+#include "mellin/mapping/submap_builder.hpp"
+
+namespace mellin {
+
+void SubmapBuilder::reset() {
+  active_ = false;
+  any_frozen_ = false;
+  taken_ = 0;
+  new_scans_ = 0;
+  path_m_ = 0.0;
+  new_path_m_ = 0.0;
+}
+
+bool SubmapBuilder::scan_taken(const Pose2& session_T_base) {
+  const double step = taken_ == 0 ? 0.0 : translation(between(last_pose_, session_T_base));
+  last_pose_ = session_T_base;
+  ++taken_;
+  ++new_scans_;
+  path_m_ += step;
+  new_path_m_ += step;
+  if (!any_frozen_) {
+    return taken_ >= config_.max_scans || path_m_ >= static_cast<double>(config_.max_path_m);
+  }
+  return new_scans_ >= config_.every_scans || new_path_m_ >= static_cast<double>(config_.every_path_m);
+}
+
+std::uint32_t SubmapBuilder::scans_in_path(const LocalMapper& mapper) const {
+  const std::uint32_t end = mapper.scans().end();
+  std::uint32_t count = 1;
+  double path = 0.0;
+  while (count < config_.max_scans && end - count > mapper.first_remembered()) {
+    path += translation(between(mapper.scan_pose(end - count - 1), mapper.scan_pose(end - count)));
+    if (path > static_cast<double>(config_.max_path_m)) {
+      break;
+    }
+    ++count;
+  }
+  return count;
+}
+
+Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells, SubmapHeader& header) {
+  if (active_) {
+    return Status::busy;
+  }
+  const std::uint32_t end = mapper.scans().end();
+  if (end == 0) {
+    return Status::degenerate;
+  }
+  scan_count_ = scans_in_path(mapper);
+  first_scan_ = end - scan_count_;
+  Pose2 low = mapper.scan_pose(first_scan_);
+  Pose2 high = low;
+  for (std::uint32_t i = 1; i < scan_count_; ++i) {
+    const Pose2 pose = mapper.scan_pose(first_scan_ + i);
+    low = {pose.x < low.x ? pose.x : low.x, pose.y < low.y ? pose.y : low.y, 0.0};
+    high = {pose.x > high.x ? pose.x : high.x, pose.y > high.y ? pose.y : high.y, 0.0};
+  }
+  const Pose2 centre{0.5 * (low.x + high.x), 0.5 * (low.y + high.y), 0.0};
+  for (std::uint32_t i = 0; i < scan_count_; ++i) {
+    memory_.poses[i] = between(centre, mapper.scan_pose(first_scan_ + i));
+  }
+  header.session_T_submap = centre;
+  header.submap_T_robot = memory_.poses[scan_count_ - 1];
+  header.stamp_us = mapper.scans().stamp_us(end - 1);
+  header.first_scan = first_scan_;
+  header.scan_count = scan_count_;
+  cells_ = cells;
+  next_row_ = 0;
+  active_ = true;
+  any_frozen_ = true;
+  new_scans_ = 0;
+  new_path_m_ = 0.0;
+  return Status::ok;
+}
+
+Result<bool> SubmapBuilder::step(const ScanMemory& scans) {
+  if (!active_) {
+    return true;
+  }
+  if (!scans.holds(first_scan_)) {
+    active_ = false;
+    return Status::not_found;
+  }
+  const std::int32_t half = config_.side / 2;
+  const auto rows = static_cast<std::int32_t>(config_.side - next_row_ < config_.band_rows ? config_.side - next_row_
+                                                                                           : config_.band_rows);
+  for (CellCount& cell : memory_.band) {
+    cell = CellCount{};
+  }
+  // World cells of this band: the submap's origin is the corner of cell (0, 0).
+  const CellRect rect{-half, next_row_ - half, half, next_row_ - half + rows};
+  for (std::uint32_t i = 0; i < scan_count_; ++i) {
+    scans.visit_rays(first_scan_ + i, grid_pose(memory_.poses[i], config_.cell_m), config_.cell_m, [&](const Ray& ray) {
+      visit_ray(ray, rect, [&](std::int32_t column, std::int32_t row, bool hit) {
+        CellCount& cell = memory_.band[static_cast<std::size_t>(row - rect.row_min) * config_.side +
+                                       static_cast<std::size_t>(column + half)];
+        ++cell.observations;
+        cell.hits = static_cast<std::uint16_t>(cell.hits + (hit ? 1 : 0));
+      });
+    });
+  }
+  const std::size_t first = std::size_t{next_row_} * config_.side;
+  const std::size_t count = static_cast<std::size_t>(rows) * config_.side;
+  for (std::size_t i = 0; i < count; ++i) {
+    cells_[first + i] = submap_cell(memory_.band[i]);
+  }
+  next_row_ = static_cast<std::uint16_t>(next_row_ + rows);
+  active_ = next_row_ < config_.side;
+  return !active_;
+}
+
+}  // namespace mellin
