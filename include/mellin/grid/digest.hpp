@@ -62,13 +62,14 @@ class DigestMaker {
   /// Starts on `grid`; grid, scratch and out must live until step() is done.
   /// invalid_argument: sizes do not hold, or the grid's side is not the digest's times a power of two.
   Status begin(const GridView& grid, Span<float> scratch, const DigestOut& out);
-  /// Treats up to `lines` rows (each of at most the grid's side times two cells); true when done.
+  /// Treats up to `lines` rows, of the grid's cells under two rows of its first half, or under a row of the digest for
+  /// the masks: at most grid side * max(4, grid side / digest side) cells a row; true when done.
   bool step(std::size_t lines);
 
  private:
   enum class Stage : std::uint8_t { masks, first, halve, write, done };
 
-  bool stage_done() const;
+  std::size_t stage_rows() const;
   void next_stage();
   void mask_row(std::size_t row);
   void first_row(std::size_t row);
@@ -80,9 +81,8 @@ class DigestMaker {
   Span<float> scratch_;
   Stage stage_ = Stage::done;
   std::size_t row_ = 0;     // next row of the stage
-  std::uint16_t side_ = 0;  // of the picture in the scratch memory
-  float divisor_ = 1.0F;    // of that picture, not yet divided by it: its maximum
-  float largest_ = 0.0F;    // maximum of the picture under way
+  std::uint16_t side_ = 0;  // of the picture that the stage makes
+  float largest_ = 0.0F;    // maximum of that picture so far
 };
 
 /// All of it at once. Status as DigestMaker::begin(). Time: some ten operations a cell.

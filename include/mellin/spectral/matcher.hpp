@@ -184,7 +184,7 @@ class Matcher {
     locate_peak
   };
   struct RotationPeak {
-    float angle_rad = 0.0F;
+    double angle_rad = 0.0;
     float strength = 0.0F;
   };
 
@@ -194,9 +194,10 @@ class Matcher {
 
   ImageView picture_image() const;
   void load_rows(std::size_t first, std::size_t count);
-  void blur_edges(std::size_t count);
+  void blur_edges(std::size_t first, std::size_t count);
   void transform_picture_rows(std::size_t first, std::size_t count);
   void transform_picture_columns(std::size_t first, std::size_t count);
+  void end_magnitudes();
   void whiten_columns(std::size_t first, std::size_t count);
   void sample_rings(std::size_t first, std::size_t count);
   void scale_rings(std::size_t first, std::size_t count);
@@ -207,6 +208,9 @@ class Matcher {
   void search_surface_rows(std::size_t first, std::size_t count);
   void locate_peak();
   void add_hypothesis(const Hypothesis& hypothesis);
+  /// Sum of the rings' cross spectra; the columns' lines are not in use meanwhile.
+  Span<Complex> cross_spectrum() const { return memory_.lines.first(config_.side / 2U + 1U); }
+  /// Spectrum of the correlation surface under way, columns back.
   Span<Complex> surface() const { return half_turn_ ? memory_.second : memory_.first; }
 
   MatcherConfig config_;
@@ -222,15 +226,18 @@ class Matcher {
 
   Span<const std::uint8_t> picture_;
   Features* out_ = nullptr;
+  std::uint8_t lowest_ = 0;  // of the picture's bytes
+  std::uint8_t highest_ = 0;
   double sum_ = 0.0;  // of magnitudes, then of the rings' energy
 
   Features a_;
   Features b_;
   MatchOptions options_;
   FixedList<RotationPeak, kMaxRotationPeaks> rotations_;
-  std::size_t rotation_ = 0;  // the one under way
-  bool half_turn_ = false;    // looking at beta + 180 degrees
-  float best_ = 0.0F;         // highest value of the correlation surface so far, and where
+  std::size_t rotation_count_ = 0;  // of them that are tried
+  std::size_t rotation_ = 0;        // the one under way
+  bool half_turn_ = false;          // looking at beta + 180 degrees
+  float best_ = 0.0F;               // highest value of the correlation surface so far, and where
   std::size_t best_row_ = 0;
   std::size_t best_column_ = 0;
   HypothesisList hypotheses_;
