@@ -84,6 +84,40 @@ class Alignment {
   /// The outcome once step() has returned false. busy: not yet; degenerate: too few points of b fall on what a observed
   /// to say anything (fewer than 30 inliers).
   Result<AlignmentResult> result() const;
+
+ private:
+  enum class Stage : std::uint8_t { idle, field, count, points, iterate, done };
+  struct Sample {
+    bool observed = false;  ///< by a
+    bool near = false;      ///< within capture_m of an obstacle; the rest is valid only then
+    float distance_m = 0.0F;
+    float gradient_x = 0.0F;
+    float gradient_y = 0.0F;
+  };
+
+  int slice_end(const GridView& grid) const;
+  void advance(const GridView& grid, int end, Stage next);
+  void build_field();
+  void stamp_distance(const Point2f& obstacle);
+  void count_obstacles();
+  void collect_points();
+  Sample sample(float x_m, float y_m) const;
+  void iterate();
+  void finish();
+
+  AlignmentConfig config_;
+  Memory memory_;
+  GridView a_;
+  GridView b_;
+  Pose2 a_T_b_;
+  Stage stage_ = Stage::idle;
+  int row_ = 0;                  ///< next row of the field, or of the points
+  std::uint32_t obstacles_ = 0;  ///< obstacle cells of b …
+  std::uint32_t seen_ = 0;       ///< … and how many of them collect_points() has passed
+  std::size_t point_count_ = 0;
+  float reach_m_ = 0.0F;  ///< of the residuals in the current stage
+  std::uint32_t inliers_ = 0;
+  AlignmentResult result_;
 };
 
 }  // namespace mellin
