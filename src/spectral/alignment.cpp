@@ -9,9 +9,10 @@ namespace {
 constexpr std::uint8_t kBeyond = 255;      // field value: no obstacle within capture_m
 constexpr float kUnitsAtCapture = 254.0F;  // field value at capture_m
 constexpr float kStageShrink = 0.7F;       // each iteration narrows the reach by this, down to final_m
-constexpr double kDamping = 1e-3;          // share of the mean stiffness added to each axis (Levenberg)
-constexpr double kConvergedXy = 1e-4;      // m
-constexpr double kConvergedTheta = 2e-5;   // rad
+constexpr double kDamping = 1e-3;          // least share of the mean stiffness added to each axis
+constexpr double kDampingStep = 8.0;       // it grows by this where a step makes things worse, and shrinks again
+constexpr double kConvergedXy = 1e-3;      // m
+constexpr double kConvergedTheta = 2e-4;   // rad
 constexpr std::uint32_t kFewestInliers = 30;
 constexpr float kNormalWindow_m = 0.3F;  // half side of the window that a wall's direction is taken from
 constexpr float kStraightness = 0.1F;    // largest ratio of the scatter across to the scatter along a wall
@@ -162,6 +163,9 @@ Status Alignment::begin(const GridView& a, const GridView& b, const Pose2& a_T_b
   seen_ = 0;
   point_count_ = 0;
   reach_m_ = config_.capture_m;
+  trial_ = a_T_b;
+  damping_ = kDamping;
+  settled_ = false;
   result_ = {};
   std::fill(memory_.field.begin(), memory_.field.end(), kBeyond);
   stage_ = Stage::field;
@@ -303,41 +307,59 @@ Alignment::Sample Alignment::sample(float x_m, float y_m) const {
   return sample;
 }
 
-void Alignment::iterate() {
-  const bool last_stage = reach_m_ <= config_.final_m;
-  const SinCos turn = sincos(a_T_b_.theta);
+/// Robust cost at the trial pose with its Gauss-Newton system: Tukey's biweight, in iteratively reweighted form.
+Alignment::System Alignment::linearise(const Pose2& a_T_b) const {
+  const SinCos turn = sincos(a_T_b.theta);
   const auto c = static_cast<float>(turn.cos);
   const auto s = static_cast<float>(turn.sin);
-  const auto tx = static_cast<float>(a_T_b_.x);
-  const auto ty = static_cast<float>(a_T_b_.y);
+  const auto tx = static_cast<float>(a_T_b.x);
+  const auto ty = static_cast<float>(a_T_b.y);
   const float reach2 = reach_m_ * reach_m_;
-  Sym3 stiffness;
-  Pose2 pull;
+  System system;
   for (std::size_t i = 0; i < point_count_; ++i) {
     const AlignmentPoint& p = memory_.points[i];
     const Sample at = sample(c * p.x - s * p.y + tx, s * p.x + c * p.y + ty);
     const float d2 = at.distance_m * at.distance_m;
     if (!at.near || d2 >= reach2) {
+      system.cost += 1.0;
       continue;
     }
-    const float tukey = (1.0F - d2 / reach2) * (1.0F - d2 / reach2);
     const float gx = c * at.gradient_x + s * at.gradient_y;
     const float gy = -s * at.gradient_x + c * at.gradient_y;
-    add_witness(stiffness, p, gx, gy, static_cast<double>(tukey));
+    const float inside = 1.0F - d2 / reach2;
+    const float tukey = inside * inside;
+    system.cost += static_cast<double>(1.0F - tukey * inside);
+    add_witness(system.stiffness, p, gx, gy, static_cast<double>(tukey));
     const float force = tukey * at.distance_m;
-    pull.x -= static_cast<double>(force * gx);
-    pull.y -= static_cast<double>(force * gy);
-    pull.theta -= static_cast<double>(force * (p.x * gy - p.y * gx));
+    system.pull.x -= static_cast<double>(force * gx);
+    system.pull.y -= static_cast<double>(force * gy);
+    system.pull.theta -= static_cast<double>(force * (p.x * gy - p.y * gx));
   }
-  const double mean = 0.5 * (stiffness.xx + stiffness.yy);
-  Sym3 inner;
+  return system;
+}
+
+/// One step of Levenberg and Marquardt from the best pose so far. Costs compare within the last stage only, whose reach
+/// stays.
+void Alignment::iterate() {
+  const bool last_stage = reach_m_ <= config_.final_m;
+  const System trial = linearise(trial_);
   ++result_.iterations;
-  if (!invert(stiffness + diagonal(kDamping * mean, kDamping * mean, kDamping * stiffness.tt), inner)) {
+  if (last_stage && settled_ && trial.cost > best_.cost) {
+    damping_ *= kDampingStep;
+  } else {
+    best_ = trial;
+    a_T_b_ = trial_;
+    damping_ = std::max(kDamping, damping_ / kDampingStep);
+    settled_ = last_stage;
+  }
+  const double xy = damping_ * 0.5 * (best_.stiffness.xx + best_.stiffness.yy);
+  Sym3 inner;
+  if (!invert(best_.stiffness + diagonal(xy, xy, damping_ * best_.stiffness.tt), inner)) {
     finish();
     return;
   }
-  const Pose2 move = multiply(inner, pull);
-  a_T_b_ = compose(a_T_b_, move);
+  const Pose2 move = multiply(inner, best_.pull);
+  trial_ = compose(a_T_b_, move);
   result_.converged = last_stage && translation(move) < kConvergedXy && std::fabs(move.theta) < kConvergedTheta;
   if (result_.converged || result_.iterations >= config_.max_iterations) {
     finish();
@@ -365,8 +387,9 @@ void Alignment::finish() {
     const AlignmentPoint& p = memory_.points[i];
     const Sample at =
         sample(c * p.x - s * p.y + static_cast<float>(a_T_b_.x), s * p.x + c * p.y + static_cast<float>(a_T_b_.y));
-    shared += at.observed ? 1U : 0U;
-    if (!at.near || at.distance_m > config_.final_m) {
+    const bool inlier = at.near && at.distance_m < config_.final_m;
+    shared += at.observed || inlier ? 1U : 0U;
+    if (!inlier) {
       continue;
     }
     ++inliers;
@@ -376,7 +399,7 @@ void Alignment::finish() {
   result_.a_T_b = a_T_b_;
   result_.points = static_cast<std::uint16_t>(point_count_);
   inliers_ = inliers;
-  result_.inlier_share = shared > 0 ? std::min(1.0F, static_cast<float>(inliers) / static_cast<float>(shared)) : 0.0F;
+  result_.inlier_share = shared > 0 ? static_cast<float>(inliers) / static_cast<float>(shared) : 0.0F;
   result_.rms_m = inliers > 0 ? static_cast<float>(std::sqrt(squares / inliers)) : 0.0F;
   result_.information =
       with_floor(information, static_cast<double>(config_.floor_xy_m), static_cast<double>(config_.floor_theta_rad));

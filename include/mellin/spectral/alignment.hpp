@@ -45,7 +45,7 @@ struct AlignmentResult {
   /// Information of the measurement Z = a_T_b over e = (x, y, theta) of Z^-1 (w_T_a^-1 w_T_b), in Z's own frame (axes
   /// of b), as EDGE_SE2 of g2o has it. Along a corridor its stiffness goes to zero: it is positive semidefinite.
   Sym3 information;
-  bool converged = false;  ///< the last step was below 0.1 mm and 0.001 degrees in the last stage
+  bool converged = false;  ///< the last step was below 1 mm and 0.2 mrad in the last stage
   std::uint16_t iterations = 0;
   std::uint16_t points = 0;   ///< of b that took part
   float inlier_share = 0.0F;  ///< of the points that fall where a observed: closer than final_m to an obstacle
@@ -95,6 +95,13 @@ class Alignment {
     float gradient_y = 0.0F;
   };
 
+  /// Gauss-Newton system over e = (x, y, theta) on the right of a_T_b.
+  struct System {
+    double cost = 0.0;  ///< robust: 0 a point on an obstacle, 1 a point out of reach
+    Sym3 stiffness;
+    Pose2 pull;
+  };
+
   int slice_end(const GridView& grid) const;
   void advance(const GridView& grid, int end, Stage next);
   void build_field();
@@ -102,6 +109,7 @@ class Alignment {
   void count_obstacles();
   void collect_points();
   Sample sample(float x_m, float y_m) const;
+  System linearise(const Pose2& a_T_b) const;
   void iterate();
   void finish();
 
@@ -109,7 +117,11 @@ class Alignment {
   Memory memory_;
   GridView a_;
   GridView b_;
-  Pose2 a_T_b_;
+  Pose2 a_T_b_;  ///< best so far …
+  System best_;  ///< … and the system there
+  Pose2 trial_;  ///< to be tried next
+  double damping_ = 0.0;
+  bool settled_ = false;  ///< best_ belongs to the last stage
   Stage stage_ = Stage::idle;
   int row_ = 0;                  ///< next row of the field, or of the points
   std::uint32_t obstacles_ = 0;  ///< obstacle cells of b …
