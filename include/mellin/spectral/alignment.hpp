@@ -1,0 +1,135 @@
+// Alignment of a registered pair: moves the hypothesis a_T_b, good to a few pixels, until the occupied cells of b lie
+// on the obstacles of a. Registration by phase correlation is good to about a cell; the pose graph's edges deserve
+// better.
+//
+// Gauss-Newton on a truncated distance field of a (the likelihood field of Thrun, Burgard, Fox, "Probabilistic
+// Robotics", 6.4, with the distance kept instead of its exponential): residual of a point is its distance to the
+// nearest obstacle, its gradient the obstacle's normal. Truncation makes it robust and narrows from capture_m to
+// final_m (coarse to fine).
+#pragma once
+
+#include <cstdint>
+
+#include "mellin/core/arena.hpp"
+#include "mellin/core/se2.hpp"
+#include "mellin/core/span.hpp"
+#include "mellin/core/status.hpp"
+#include "mellin/grid/submap.hpp"
+
+namespace mellin {
+
+struct AlignmentConfig {
+  std::uint16_t max_side = 768;      ///< cells; the largest grid that begin() takes (a byte each)
+  std::uint16_t max_points = 4096;   ///< obstacle points used, spread evenly when there are more (20 bytes each)
+  std::uint16_t rows_per_step = 32;  ///< grid rows that one step() works on while it builds the field or the points
+  std::uint16_t max_iterations = 40;
+  std::uint8_t occupied_from = 64;  ///< a cell is an obstacle from this many 254ths of hits per observation on
+  float capture_m = 0.8F;           ///< reach of the distance field: points further from any obstacle exert no pull
+  float final_m = 0.15F;            ///< reach in the last stage: points further away are outliers
+  float point_sigma_m = 0.05F;      ///< deviation of a point from its obstacle where the pose is right …
+  float correlation_m = 0.5F;       ///< … correlated over this length of wall: as many points are one witness
+  float floor_xy_m = 0.015F;        ///< deviation that no number of points gets below: submaps are not quite rigid …
+  float floor_theta_rad = 0.0025F;  ///< … the same of the heading
+};
+
+/// An obstacle point in the frame of its submap.
+struct AlignmentPoint {
+  float x = 0.0F;  ///< m, to a fraction of a cell: centre of mass of the hits round it
+  float y = 0.0F;
+  float normal_x = 0.0F;  ///< unit normal of the wall through it; (0, 0) where no wall direction is evident
+  float normal_y = 0.0F;
+};
+
+struct AlignmentResult {
+  Pose2 a_T_b;
+  /// Information of the measurement Z = a_T_b over e = (x, y, theta) of Z^-1 (w_T_a^-1 w_T_b), in Z's own frame (axes
+  /// of b), as EDGE_SE2 of g2o has it. Along a corridor its stiffness goes to zero: it is positive semidefinite.
+  Sym3 information;
+  bool converged = false;  ///< the last step was below 1 mm and 0.2 mrad in the last stage
+  std::uint16_t iterations = 0;
+  std::uint16_t points = 0;   ///< of b that took part
+  float inlier_share = 0.0F;  ///< of the points that fall where a observed: closer than final_m to an obstacle
+  float rms_m = 0.0F;         ///< distance of the inliers to their obstacles
+};
+
+/// One alignment at a time in memory given once. begin(), then step() until it returns false, then result().
+class Alignment {
+ public:
+  struct Memory {
+    Span<std::uint8_t> field;     ///< distance to the nearest obstacle of a, max_side^2
+    Span<AlignmentPoint> points;  ///< of b, max_points
+  };
+
+  template <class A>
+  static constexpr Memory carve(A& arena, const AlignmentConfig& config) {
+    Memory memory;
+    memory.field =
+        arena.template take<std::uint8_t>(static_cast<std::size_t>(config.max_side) * config.max_side, Part::spectral);
+    memory.points = arena.template take<AlignmentPoint>(config.max_points, Part::spectral);
+    return memory;
+  }
+
+  /// invalid_config: a zero or non-finite field, final_m over capture_m; insufficient_memory: `memory` is not what
+  /// carve() makes of `config`.
+  Status init(const AlignmentConfig& config, const Memory& memory);
+
+  /// Starts aligning. Both grids stay the caller's and must live until step() returned false. invalid_argument: a grid
+  /// larger than max_side or with a size that does not fit its cells, a pose that is not finite.
+  Status begin(const GridView& a, const GridView& b, const Pose2& a_T_b);
+
+  /// One slice: rows_per_step rows of the field, or as many of the points, or one iteration over the points. Returns
+  /// whether there is more to do.
+  bool step();
+
+  /// The outcome once step() has returned false. busy: not yet; degenerate: too few points of b fall on what a observed
+  /// to say anything (fewer than 30 inliers).
+  Result<AlignmentResult> result() const;
+
+ private:
+  enum class Stage : std::uint8_t { idle, field, count, points, iterate, done };
+  struct Sample {
+    bool observed = false;  ///< by a
+    bool near = false;      ///< within capture_m of an obstacle; the rest is valid only then
+    float distance_m = 0.0F;
+    float gradient_x = 0.0F;
+    float gradient_y = 0.0F;
+  };
+
+  /// Gauss-Newton system over e = (x, y, theta) on the right of a_T_b.
+  struct System {
+    double cost = 0.0;  ///< robust: 0 a point on an obstacle, 1 a point out of reach
+    Sym3 stiffness;
+    Pose2 pull;
+  };
+
+  int slice_end(const GridView& grid) const;
+  void advance(const GridView& grid, int end, Stage next);
+  void build_field();
+  void stamp_distance(const Point2f& obstacle);
+  void count_obstacles();
+  void collect_points();
+  Sample sample(float x_m, float y_m) const;
+  System linearise(const Pose2& a_T_b) const;
+  void iterate();
+  void finish();
+
+  AlignmentConfig config_;
+  Memory memory_;
+  GridView a_;
+  GridView b_;
+  Pose2 a_T_b_;  ///< best so far …
+  System best_;  ///< … and the system there
+  Pose2 trial_;  ///< to be tried next
+  double damping_ = 0.0;
+  bool settled_ = false;  ///< best_ belongs to the last stage
+  Stage stage_ = Stage::idle;
+  int row_ = 0;                  ///< next row of the field, or of the points
+  std::uint32_t obstacles_ = 0;  ///< obstacle cells of b …
+  std::uint32_t seen_ = 0;       ///< … and how many of them collect_points() has passed
+  std::size_t point_count_ = 0;
+  float reach_m_ = 0.0F;  ///< of the residuals in the current stage
+  std::uint32_t inliers_ = 0;
+  AlignmentResult result_;
+};
+
+}  // namespace mellin

@@ -1,0 +1,419 @@
+#include "mellin/spectral/alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mellin {
+namespace {
+
+constexpr std::uint8_t kBeyond = 255;      // field value: no obstacle within capture_m
+constexpr float kUnitsAtCapture = 254.0F;  // field value at capture_m
+constexpr float kStageShrink = 0.7F;       // each iteration narrows the reach by this, down to final_m
+constexpr double kDamping = 1e-3;          // least share of the mean stiffness added to each axis
+constexpr double kDampingStep = 8.0;       // it grows by this where a step makes things worse, and shrinks again
+constexpr double kConvergedXy = 1e-3;      // m
+constexpr double kConvergedTheta = 2e-4;   // rad
+constexpr std::uint32_t kFewestInliers = 30;
+constexpr float kNormalWindow_m = 0.3F;  // half side of the window that a wall's direction is taken from
+constexpr float kStraightness = 0.1F;    // largest ratio of the scatter across to the scatter along a wall
+constexpr float kFewestInWindow = 4.0F;
+
+bool valid(const AlignmentConfig& c) {
+  const float positive[] = {c.capture_m, c.final_m, c.point_sigma_m, c.correlation_m, c.floor_xy_m, c.floor_theta_rad};
+  for (const float value : positive) {
+    if (!(value > 0.0F) || !std::isfinite(value)) {
+      return false;
+    }
+  }
+  return c.max_side > 0 && c.max_points > 0 && c.rows_per_step > 0 && c.max_iterations > 0 && c.occupied_from > 0 &&
+         c.final_m <= c.capture_m;
+}
+
+bool valid(const GridView& grid, std::uint16_t max_side) {
+  return grid.side >= 2 && grid.side % 2 == 0 && grid.side <= max_side &&
+         grid.cells.size() == static_cast<std::size_t>(grid.side) * grid.side && grid.cell_m > 0.0F &&
+         std::isfinite(grid.cell_m);
+}
+
+bool occupied(const GridView& grid, int column, int row, std::uint8_t from) {
+  const std::uint8_t cell = grid.at(static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row));
+  return cell != kUnobserved && cell >= from;
+}
+
+/// Centre of mass of the hits in the 3 x 3 cells round an obstacle, in cells from the grid's corner.
+Point2f centre_of_hits(const GridView& grid, int column, int row) {
+  float weight = 0.0F;
+  float x = 0.0F;
+  float y = 0.0F;
+  for (int r = std::max(0, row - 1); r <= std::min(grid.side - 1, row + 1); ++r) {
+    for (int c = std::max(0, column - 1); c <= std::min(grid.side - 1, column + 1); ++c) {
+      const std::uint8_t cell = grid.at(static_cast<std::uint16_t>(c), static_cast<std::uint16_t>(r));
+      const float w = cell == kUnobserved ? 0.0F : static_cast<float>(cell);
+      weight += w;
+      x += w * static_cast<float>(c - column);
+      y += w * static_cast<float>(r - row);
+    }
+  }
+  return {static_cast<float>(column) + 0.5F + x / weight, static_cast<float>(row) + 0.5F + y / weight};
+}
+
+/// Unit normal of the wall through (column, row): the minor axis of the obstacles in the window round it; (0, 0) where
+/// they do not lie along a line.
+Point2f wall_normal(const GridView& grid, int column, int row, int reach, std::uint8_t from) {
+  float n = 0.0F;
+  float sx = 0.0F;
+  float sy = 0.0F;
+  float sxx = 0.0F;
+  float sxy = 0.0F;
+  float syy = 0.0F;
+  for (int r = std::max(0, row - reach); r <= std::min(grid.side - 1, row + reach); ++r) {
+    for (int c = std::max(0, column - reach); c <= std::min(grid.side - 1, column + reach); ++c) {
+      if (occupied(grid, c, r, from)) {
+        const auto dx = static_cast<float>(c - column);
+        const auto dy = static_cast<float>(r - row);
+        n += 1.0F;
+        sx += dx;
+        sy += dy;
+        sxx += dx * dx;
+        sxy += dx * dy;
+        syy += dy * dy;
+      }
+    }
+  }
+  if (n < kFewestInWindow) {
+    return {};
+  }
+  const float xx = sxx - sx * sx / n;
+  const float xy = sxy - sx * sy / n;
+  const float yy = syy - sy * sy / n;
+  const float half_trace = 0.5F * (xx + yy);
+  const float half_difference = 0.5F * (xx - yy);
+  const float spread = sqrt(half_difference * half_difference + xy * xy);
+  if (half_trace - spread > kStraightness * (half_trace + spread)) {
+    return {};
+  }
+  // The minor axis is orthogonal to the major one, (spread + half_difference, xy) or (xy, spread - half_difference);
+  // the longer of the two is the better conditioned.
+  Point2f normal =
+      half_difference >= 0.0F ? Point2f{-xy, spread + half_difference} : Point2f{spread - half_difference, -xy};
+  const float length = sqrt(normal.x * normal.x + normal.y * normal.y);
+  if (!(length > 0.0F)) {
+    return {};
+  }
+  return {normal.x / length, normal.y / length};
+}
+
+void add_witness(Sym3& sum, const AlignmentPoint& p, float nx, float ny, double weight) {
+  const float lever = p.x * ny - p.y * nx;
+  sum.xx += weight * static_cast<double>(nx * nx);
+  sum.xy += weight * static_cast<double>(nx * ny);
+  sum.xt += weight * static_cast<double>(nx * lever);
+  sum.yy += weight * static_cast<double>(ny * ny);
+  sum.yt += weight * static_cast<double>(ny * lever);
+  sum.tt += weight * static_cast<double>(lever * lever);
+}
+
+Pose2 multiply(const Sym3& m, const Pose2& v) {
+  return {m.xx * v.x + m.xy * v.y + m.xt * v.theta, m.xy * v.x + m.yy * v.y + m.yt * v.theta,
+          m.xt * v.x + m.yt * v.y + m.tt * v.theta};
+}
+
+/// Information of a measurement with information `m` and an independent error of covariance diag(xx, xx, tt) on top:
+/// (m^-1 + S)^-1 = m - m (m + S^-1)^-1 m, which a singular m does not disturb.
+Sym3 with_floor(const Sym3& m, double deviation_xy, double deviation_theta) {
+  const double wxy = 1.0 / (deviation_xy * deviation_xy);
+  Sym3 inner;
+  if (!invert(m + diagonal(wxy, wxy, 1.0 / (deviation_theta * deviation_theta)), inner)) {
+    return {};
+  }
+  const Pose2 c0 = multiply(inner, {m.xx, m.xy, m.xt});
+  const Pose2 c1 = multiply(inner, {m.xy, m.yy, m.yt});
+  const Pose2 c2 = multiply(inner, {m.xt, m.yt, m.tt});
+  const Pose2 r0 = multiply(m, c0);
+  const Pose2 r1 = multiply(m, c1);
+  const Pose2 r2 = multiply(m, c2);
+  return {m.xx - r0.x, m.xy - r1.x, m.xt - r2.x, m.yy - r1.y, m.yt - r2.y, m.tt - r2.theta};
+}
+
+}  // namespace
+
+Status Alignment::init(const AlignmentConfig& config, const Memory& memory) {
+  if (!valid(config)) {
+    return Status::invalid_config;
+  }
+  if (memory.field.size() != static_cast<std::size_t>(config.max_side) * config.max_side ||
+      memory.points.size() != config.max_points) {
+    return Status::insufficient_memory;
+  }
+  config_ = config;
+  memory_ = memory;
+  stage_ = Stage::idle;
+  return Status::ok;
+}
+
+Status Alignment::begin(const GridView& a, const GridView& b, const Pose2& a_T_b) {
+  if (memory_.field.empty() || !valid(a, config_.max_side) || !valid(b, config_.max_side) || !is_finite(a_T_b)) {
+    return Status::invalid_argument;
+  }
+  a_ = a;
+  b_ = b;
+  a_T_b_ = a_T_b;
+  row_ = 0;
+  obstacles_ = 0;
+  seen_ = 0;
+  point_count_ = 0;
+  reach_m_ = config_.capture_m;
+  trial_ = a_T_b;
+  damping_ = kDamping;
+  settled_ = false;
+  result_ = {};
+  std::fill(memory_.field.begin(), memory_.field.end(), kBeyond);
+  stage_ = Stage::field;
+  return Status::ok;
+}
+
+bool Alignment::step() {
+  switch (stage_) {
+    case Stage::field:
+      build_field();
+      break;
+    case Stage::count:
+      count_obstacles();
+      break;
+    case Stage::points:
+      collect_points();
+      break;
+    case Stage::iterate:
+      iterate();
+      break;
+    case Stage::idle:
+    case Stage::done:
+      break;
+  }
+  return stage_ != Stage::idle && stage_ != Stage::done;
+}
+
+/// Moves row_ on by a slice of `grid`; at the end starts `next` at row 0.
+void Alignment::advance(const GridView& grid, int end, Stage next) {
+  row_ = end;
+  if (row_ == grid.side) {
+    row_ = 0;
+    stage_ = next;
+  }
+}
+
+int Alignment::slice_end(const GridView& grid) const { return std::min<int>(grid.side, row_ + config_.rows_per_step); }
+
+void Alignment::build_field() {
+  const int end = slice_end(a_);
+  for (int row = row_; row < end; ++row) {
+    for (int column = 0; column < a_.side; ++column) {
+      if (occupied(a_, column, row, config_.occupied_from)) {
+        stamp_distance(centre_of_hits(a_, column, row));
+      }
+    }
+  }
+  advance(a_, end, Stage::count);
+}
+
+/// Lowers the field to the distance from an obstacle (cells from the corner) wherever that is nearer.
+void Alignment::stamp_distance(const Point2f& obstacle) {
+  const float reach = config_.capture_m / a_.cell_m;
+  const float units = kUnitsAtCapture / reach;
+  const auto limit = static_cast<float>(a_.side - 1);
+  const int first_column = static_cast<int>(std::max(0.0F, obstacle.x - reach));
+  const int last_column = static_cast<int>(std::min(limit, obstacle.x + reach));
+  const int first_row = static_cast<int>(std::max(0.0F, obstacle.y - reach));
+  const int last_row = static_cast<int>(std::min(limit, obstacle.y + reach));
+  for (int row = first_row; row <= last_row; ++row) {
+    const float dy = (static_cast<float>(row) + 0.5F - obstacle.y) * units;
+    std::uint8_t* const cells = memory_.field.data() + static_cast<std::size_t>(row) * a_.side;
+    for (int column = first_column; column <= last_column; ++column) {
+      const float dx = (static_cast<float>(column) + 0.5F - obstacle.x) * units;
+      const float squared = dx * dx + dy * dy;
+      const float rounded_up = static_cast<float>(cells[column]) - 0.5F;
+      if (squared < rounded_up * rounded_up) {
+        cells[column] = static_cast<std::uint8_t>(sqrt(squared) + 0.5F);
+      }
+    }
+  }
+}
+
+void Alignment::count_obstacles() {
+  const int end = slice_end(b_);
+  for (int row = row_; row < end; ++row) {
+    for (int column = 0; column < b_.side; ++column) {
+      obstacles_ += occupied(b_, column, row, config_.occupied_from) ? 1U : 0U;
+    }
+  }
+  advance(b_, end, Stage::points);
+}
+
+void Alignment::collect_points() {
+  const int end = slice_end(b_);
+  const std::uint32_t wanted = std::min<std::uint32_t>(obstacles_, config_.max_points);
+  const int reach = std::max(1, static_cast<int>(kNormalWindow_m / b_.cell_m));
+  const float half = 0.5F * static_cast<float>(b_.side);
+  for (int row = row_; row < end; ++row) {
+    for (int column = 0; column < b_.side; ++column) {
+      if (!occupied(b_, column, row, config_.occupied_from)) {
+        continue;
+      }
+      // Obstacle k is taken where k * wanted / obstacles steps up: evenly, and exactly `wanted` of them.
+      const std::uint64_t due = (static_cast<std::uint64_t>(seen_) + 1) * wanted / obstacles_;
+      ++seen_;
+      if (due == point_count_) {
+        continue;
+      }
+      const Point2f at = centre_of_hits(b_, column, row);
+      const Point2f normal = wall_normal(b_, column, row, reach, config_.occupied_from);
+      memory_.points[point_count_++] = {(at.x - half) * b_.cell_m, (at.y - half) * b_.cell_m, normal.x, normal.y};
+    }
+  }
+  advance(b_, end, Stage::iterate);
+}
+
+/// Distance field and its gradient at a point of a, bilinear between the centres of four cells.
+Alignment::Sample Alignment::sample(float x_m, float y_m) const {
+  const float half = 0.5F * static_cast<float>(a_.side) - 0.5F;
+  const float x = x_m / a_.cell_m + half;
+  const float y = y_m / a_.cell_m + half;
+  const auto limit = static_cast<float>(a_.side - 1);
+  if (!(x >= 0.0F && y >= 0.0F && x < limit && y < limit)) {
+    return {};
+  }
+  const auto column = static_cast<std::size_t>(x);
+  const auto row = static_cast<std::size_t>(y);
+  const std::size_t at = row * a_.side + column;
+  const std::uint8_t v00 = memory_.field[at];
+  const std::uint8_t v10 = memory_.field[at + 1];
+  const std::uint8_t v01 = memory_.field[at + a_.side];
+  const std::uint8_t v11 = memory_.field[at + a_.side + 1];
+  Sample sample;
+  sample.observed = a_.cells[at] != kUnobserved;
+  if (v00 == kBeyond || v10 == kBeyond || v01 == kBeyond || v11 == kBeyond) {
+    return sample;
+  }
+  const float fx = x - static_cast<float>(column);
+  const float fy = y - static_cast<float>(row);
+  const float low = static_cast<float>(v00) + fx * static_cast<float>(v10 - v00);
+  const float high = static_cast<float>(v01) + fx * static_cast<float>(v11 - v01);
+  const float metres = config_.capture_m / kUnitsAtCapture;
+  sample.near = true;
+  sample.distance_m = (low + fy * (high - low)) * metres;
+  sample.gradient_x =
+      (static_cast<float>(v10 - v00) * (1.0F - fy) + static_cast<float>(v11 - v01) * fy) * metres / a_.cell_m;
+  sample.gradient_y = (high - low) * metres / a_.cell_m;
+  return sample;
+}
+
+/// Robust cost at the trial pose with its Gauss-Newton system: Tukey's biweight, in iteratively reweighted form.
+Alignment::System Alignment::linearise(const Pose2& a_T_b) const {
+  const SinCos turn = sincos(a_T_b.theta);
+  const auto c = static_cast<float>(turn.cos);
+  const auto s = static_cast<float>(turn.sin);
+  const auto tx = static_cast<float>(a_T_b.x);
+  const auto ty = static_cast<float>(a_T_b.y);
+  const float reach2 = reach_m_ * reach_m_;
+  System system;
+  for (std::size_t i = 0; i < point_count_; ++i) {
+    const AlignmentPoint& p = memory_.points[i];
+    const Sample at = sample(c * p.x - s * p.y + tx, s * p.x + c * p.y + ty);
+    const float d2 = at.distance_m * at.distance_m;
+    if (!at.near || d2 >= reach2) {
+      system.cost += 1.0;
+      continue;
+    }
+    const float gx = c * at.gradient_x + s * at.gradient_y;
+    const float gy = -s * at.gradient_x + c * at.gradient_y;
+    const float inside = 1.0F - d2 / reach2;
+    const float tukey = inside * inside;
+    system.cost += static_cast<double>(1.0F - tukey * inside);
+    add_witness(system.stiffness, p, gx, gy, static_cast<double>(tukey));
+    const float force = tukey * at.distance_m;
+    system.pull.x -= static_cast<double>(force * gx);
+    system.pull.y -= static_cast<double>(force * gy);
+    system.pull.theta -= static_cast<double>(force * (p.x * gy - p.y * gx));
+  }
+  return system;
+}
+
+/// One step of Levenberg and Marquardt from the best pose so far. Costs compare within the last stage only, whose reach
+/// stays.
+void Alignment::iterate() {
+  const bool last_stage = reach_m_ <= config_.final_m;
+  const System trial = linearise(trial_);
+  ++result_.iterations;
+  if (last_stage && settled_ && trial.cost > best_.cost) {
+    damping_ *= kDampingStep;
+  } else {
+    best_ = trial;
+    a_T_b_ = trial_;
+    damping_ = std::max(kDamping, damping_ / kDampingStep);
+    settled_ = last_stage;
+  }
+  const double xy = damping_ * 0.5 * (best_.stiffness.xx + best_.stiffness.yy);
+  Sym3 inner;
+  if (!invert(best_.stiffness + diagonal(xy, xy, damping_ * best_.stiffness.tt), inner)) {
+    finish();
+    return;
+  }
+  const Pose2 move = multiply(inner, best_.pull);
+  trial_ = compose(a_T_b_, move);
+  result_.converged = last_stage && translation(move) < kConvergedXy && std::fabs(move.theta) < kConvergedTheta;
+  if (result_.converged || result_.iterations >= config_.max_iterations) {
+    finish();
+  }
+  reach_m_ = std::max(config_.final_m, reach_m_ * kStageShrink);
+}
+
+/// Evidence at the final pose.
+void Alignment::finish() {
+  const SinCos turn = sincos(a_T_b_.theta);
+  const auto c = static_cast<float>(turn.cos);
+  const auto s = static_cast<float>(turn.sin);
+  // Points within correlation_m of wall count as one witness.
+  const double cells_a_point =
+      point_count_ > 0 ? static_cast<double>(obstacles_) / static_cast<double>(point_count_) : 1.0;
+  const double sigma = static_cast<double>(config_.point_sigma_m);
+  const double weight =
+      std::min(1.0, cells_a_point * static_cast<double>(b_.cell_m) / static_cast<double>(config_.correlation_m)) /
+      (sigma * sigma);
+  std::uint32_t inliers = 0;
+  std::uint32_t shared = 0;
+  double squares = 0.0;
+  Sym3 information;
+  for (std::size_t i = 0; i < point_count_; ++i) {
+    const AlignmentPoint& p = memory_.points[i];
+    const Sample at =
+        sample(c * p.x - s * p.y + static_cast<float>(a_T_b_.x), s * p.x + c * p.y + static_cast<float>(a_T_b_.y));
+    const bool inlier = at.near && at.distance_m < config_.final_m;
+    shared += at.observed || inlier ? 1U : 0U;
+    if (!inlier) {
+      continue;
+    }
+    ++inliers;
+    squares += static_cast<double>(at.distance_m * at.distance_m);
+    add_witness(information, p, p.normal_x, p.normal_y, weight);
+  }
+  result_.a_T_b = a_T_b_;
+  result_.points = static_cast<std::uint16_t>(point_count_);
+  inliers_ = inliers;
+  result_.inlier_share = shared > 0 ? static_cast<float>(inliers) / static_cast<float>(shared) : 0.0F;
+  result_.rms_m = inliers > 0 ? static_cast<float>(std::sqrt(squares / inliers)) : 0.0F;
+  result_.information =
+      with_floor(information, static_cast<double>(config_.floor_xy_m), static_cast<double>(config_.floor_theta_rad));
+  stage_ = Stage::done;
+}
+
+Result<AlignmentResult> Alignment::result() const {
+  if (stage_ != Stage::done) {
+    return Status::busy;
+  }
+  if (inliers_ < kFewestInliers) {
+    return Status::degenerate;
+  }
+  return result_;
+}
+
+}  // namespace mellin

@@ -1,0 +1,177 @@
+#include "mellin/spectral/verification.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mellin {
+namespace {
+
+constexpr std::uint8_t kMaxReachCells = 4;
+constexpr std::uint8_t kMarkFree = 16;     // classify() only: free, whatever lies beside it
+constexpr std::uint8_t kMarkBlocked = 32;  // classify() only: too close to an obstacle to contradict one
+
+bool valid(const VerificationConfig& config) {
+  return config.occupied_from >= 1 && config.occupied_from <= kCertainlyOccupied &&
+         config.near_cells <= kMaxReachCells && config.clear_cells >= config.near_cells &&
+         config.clear_cells <= kMaxReachCells && config.doubt_m >= 0.0F && std::isfinite(config.doubt_m);
+}
+
+bool valid(const Span<const std::uint8_t>& cells, std::uint16_t side, float cell_m) {
+  return side > 0 && side % 2 == 0 && cells.size() == static_cast<std::size_t>(side) * side && cell_m > 0.0F &&
+         std::isfinite(cell_m);
+}
+
+std::uint8_t class_of_block(const GridView& grid, std::uint16_t column, std::uint16_t row, std::uint16_t block,
+                            std::uint8_t occupied_from) {
+  std::uint32_t observed = 0;
+  bool occupied = false;
+  for (std::uint16_t y = 0; y < block; ++y) {
+    const std::size_t start = (static_cast<std::size_t>(row) * block + y) * grid.side + column * std::size_t{block};
+    for (std::uint16_t x = 0; x < block; ++x) {
+      const std::uint8_t cell = grid.cells[start + x];
+      observed += cell != kUnobserved ? 1U : 0U;
+      occupied = occupied || (cell != kUnobserved && cell >= occupied_from);
+    }
+  }
+  std::uint8_t bits = observed > 0 ? kClassObserved : 0;
+  if (occupied) {
+    bits |= kClassOccupied;
+  } else if (observed > 0 && 2 * observed >= static_cast<std::uint32_t>(block) * block) {
+    bits |= kMarkFree;
+  }
+  return bits;
+}
+
+/// Sets `bit` in all cells within `reach` of (column, row).
+void stamp(Span<std::uint8_t> cells, int side, int column, int row, int reach, std::uint8_t bit) {
+  for (int y = std::max(0, row - reach); y <= std::min(side - 1, row + reach); ++y) {
+    for (int x = std::max(0, column - reach); x <= std::min(side - 1, column + reach); ++x) {
+      std::uint8_t& cell =
+          cells[static_cast<std::size_t>(y) * static_cast<std::size_t>(side) + static_cast<std::size_t>(x)];
+      cell = static_cast<std::uint8_t>(cell | bit);
+    }
+  }
+}
+
+/// From occupied and free to near and clear.
+void finish_classes(Span<std::uint8_t> cells, std::uint16_t side, const VerificationConfig& config) {
+  for (std::uint16_t row = 0; row < side; ++row) {
+    for (std::uint16_t column = 0; column < side; ++column) {
+      if ((cells[static_cast<std::size_t>(row) * side + column] & kClassOccupied) != 0) {
+        stamp(cells, side, column, row, config.clear_cells, kMarkBlocked);
+        stamp(cells, side, column, row, config.near_cells, kClassNear);
+      }
+    }
+  }
+  for (std::uint8_t& cell : cells) {
+    const bool clear = (cell & kMarkFree) != 0 && (cell & kMarkBlocked) == 0;
+    cell =
+        static_cast<std::uint8_t>((cell & (kClassObserved | kClassOccupied | kClassNear)) | (clear ? kClassClear : 0));
+  }
+}
+
+/// What the cells of `from` say about `onto`, from lying at onto_T_from.
+struct Evidence {
+  std::uint32_t hits = 0;
+  std::uint32_t conflicts = 0;
+  std::uint32_t shared = 0;
+  std::uint32_t observed = 0;
+};
+
+Evidence gather(const ClassView& onto, const ClassView& from, const Pose2& onto_T_from) {
+  const SinCos turn = sincos(onto_T_from.theta);
+  const double ratio = static_cast<double>(from.cell_m) / static_cast<double>(onto.cell_m);
+  const auto along = static_cast<float>(turn.cos * ratio);
+  const auto across = static_cast<float>(turn.sin * ratio);
+  const auto offset_x = static_cast<float>(onto_T_from.x / static_cast<double>(onto.cell_m) + 0.5 * onto.side);
+  const auto offset_y = static_cast<float>(onto_T_from.y / static_cast<double>(onto.cell_m) + 0.5 * onto.side);
+  const auto limit = static_cast<float>(onto.side);
+  const float half = 0.5F * static_cast<float>(from.side) - 0.5F;
+  Evidence evidence;
+  for (std::uint16_t row = 0; row < from.side; ++row) {
+    const float y = static_cast<float>(row) - half;
+    const float row_x = offset_x - across * y;
+    const float row_y = offset_y + along * y;
+    const std::size_t start = static_cast<std::size_t>(row) * from.side;
+    for (std::uint16_t column = 0; column < from.side; ++column) {
+      const std::uint8_t seen = from.cells[start + column];
+      if ((seen & kClassObserved) == 0) {
+        continue;
+      }
+      ++evidence.observed;
+      const float x = static_cast<float>(column) - half;
+      const float onto_x = row_x + along * x;
+      const float onto_y = row_y + across * x;
+      if (!(onto_x >= 0.0F && onto_y >= 0.0F && onto_x < limit && onto_y < limit)) {
+        continue;
+      }
+      const std::uint8_t there =
+          onto.cells[static_cast<std::size_t>(onto_y) * onto.side + static_cast<std::size_t>(onto_x)];
+      evidence.shared += (there & kClassObserved) != 0 ? 1U : 0U;
+      if ((seen & kClassOccupied) != 0) {
+        evidence.hits += (there & kClassNear) != 0 ? 1U : 0U;
+        evidence.conflicts += (there & kClassClear) != 0 ? 1U : 0U;
+      }
+    }
+  }
+  return evidence;
+}
+
+float share(double part, double whole) { return whole > 0.0 ? static_cast<float>(std::min(1.0, part / whole)) : 0.0F; }
+
+}  // namespace
+
+Result<ClassView> classify(const GridView& grid, const VerificationConfig& config, std::uint16_t side,
+                           Span<std::uint8_t> out) {
+  if (!valid(config)) {
+    return Status::invalid_config;
+  }
+  const std::size_t count = static_cast<std::size_t>(side) * side;
+  if (!valid(grid.cells, grid.side, grid.cell_m) || side == 0 || side % 2 != 0 || grid.side % side != 0 ||
+      out.size() < count) {
+    return Status::invalid_argument;
+  }
+  const auto block = static_cast<std::uint16_t>(grid.side / side);
+  const Span<std::uint8_t> cells = out.first(count);
+  for (std::uint16_t row = 0; row < side; ++row) {
+    for (std::uint16_t column = 0; column < side; ++column) {
+      cells[static_cast<std::size_t>(row) * side + column] =
+          class_of_block(grid, column, row, block, config.occupied_from);
+    }
+  }
+  finish_classes(cells, side, config);
+  return ClassView{Span<const std::uint8_t>(cells), side, grid.cell_m * static_cast<float>(block)};
+}
+
+Result<Agreement> verify(const ClassView& a, const ClassView& b, const Pose2& a_T_b, const VerificationConfig& config) {
+  if (!valid(config)) {
+    return Status::invalid_config;
+  }
+  if (!valid(a.cells, a.side, a.cell_m) || !valid(b.cells, b.side, b.cell_m) || !is_finite(a_T_b)) {
+    return Status::invalid_argument;
+  }
+  const Evidence on_a = gather(a, b, a_T_b);
+  const Evidence on_b = gather(b, a, inverse(a_T_b));
+  Agreement agreement;
+  agreement.hits_b_on_a = on_a.hits;
+  agreement.conflicts_b_on_a = on_a.conflicts;
+  agreement.hits_a_on_b = on_b.hits;
+  agreement.conflicts_a_on_b = on_b.conflicts;
+  agreement.shared_cells = on_a.shared;
+
+  const auto length_a = static_cast<double>(a.cell_m);
+  const auto length_b = static_cast<double>(b.cell_m);
+  const double hits_m = 0.5 * (on_a.hits * length_b + on_b.hits * length_a);
+  const double conflicts_m = 0.5 * (on_a.conflicts * length_b + on_b.conflicts * length_a);
+  agreement.score = share(hits_m, hits_m + conflicts_m + static_cast<double>(config.doubt_m));
+
+  const double area_a = on_b.observed * length_a * length_a;
+  const double area_b = on_a.observed * length_b * length_b;
+  const double shared =
+      std::min(0.5 * (on_a.shared * length_b * length_b + on_b.shared * length_a * length_a), std::min(area_a, area_b));
+  agreement.overlap = share(shared, std::min(area_a, area_b));
+  agreement.union_overlap = share(shared, area_a + area_b - shared);
+  return agreement;
+}
+
+}  // namespace mellin
