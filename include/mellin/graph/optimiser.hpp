@@ -29,6 +29,10 @@
 
 namespace mellin {
 
+namespace graph_detail {
+struct EdgeTerms;
+}
+
 enum class Start : std::uint8_t {
   current,  ///< from the graph's poses
   chordal,  ///< from the edges alone
@@ -106,29 +110,30 @@ class Optimiser {
   Result<Sym3> relative_covariance(NodeId a, NodeId b);
 
  private:
-  static constexpr std::size_t kVectors = 4;
+  /// Vectors of three doubles a node: right-hand side and residual, solution, search direction, its image, diagonal.
+  static constexpr std::size_t kVectors = 5;
   enum class Stage : std::uint8_t { rotations, translations, poses, marginals };
-  enum class Phase : std::uint8_t { idle, order, assemble, factorise, solve, iterate, update, write };
-  struct EdgeTerms;
+  enum class Phase : std::uint8_t { idle, order, assemble, factorise, gradients, update, write };
 
   static constexpr BlockCholeskyLimits limits(const PoseGraphConfig& config) {
     return {config.max_nodes, config.max_edges, config.max_fill};
   }
   bool fixed(NodeId node) const { return graph_->component(node) == node; }
+  bool in_system(const Edge& edge) const { return edge.enabled && !(fixed(edge.a) && fixed(edge.b)); }
+  bool under_kernel(const Edge& edge) const { return edge.enabled && edge.kind != EdgeKind::odometry; }
   Span<double> vector(std::size_t which) const;
-  EdgeTerms edge_terms(const Edge& edge, double weight) const;
+  graph_detail::EdgeTerms terms(EdgeId id) const;
+  double edge_cost(EdgeId id, Span<const Pose2> poses) const;
+  double cost(Span<const Pose2> poses) const;
 
   void connect_all();
   void connect_tree();
   void order();
   void assemble();
-  void assemble_edge(EdgeId id, Span<double> gradient);
+  void add_to_matrix(EdgeId id, const graph_detail::EdgeTerms& t);
   void factorise();
-  void solve();
-  void multiply(Span<const double> x, Span<double> out) const;
-  void begin_gradients();
-  bool iterate_gradients();
-  void precondition();
+  void give_way();
+  void restore();
   void update();
   void set_rotations();
   void set_translations();
@@ -138,10 +143,15 @@ class Optimiser {
   void begin_poses();
   void finish_poses();
   void write();
-  double cost(Span<const Pose2> poses) const;
+
+  void multiply(Span<const double> x, Span<double> out) const;
+  void precondition();
+  void begin_gradients();
+  bool iterate_gradients();
+  Result<Sym3> covariance_by_gradients(NodeId a, const Block3& by_a, NodeId b, const Block3& by_b);
+
   void begin_kernel();
-  bool tighten_kernel();
-  void weigh();
+  bool weigh();
 
   Memory memory_;
   PoseGraphConfig config_;
@@ -157,9 +167,10 @@ class Optimiser {
   std::uint32_t gradient_steps_ = 0;
   double chi2_ = 0.0;
   double damping_ = 0.0;
-  double sharpness_ = 0.0;
+  double control_ = 0.0;
   double rho_ = 0.0;
   double rho_stop_ = 0.0;
+  bool kernel_done_ = true;
   bool direct_ = true;
   bool factored_ = false;
 };
