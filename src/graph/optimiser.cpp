@@ -17,6 +17,8 @@ constexpr double kRounding = 1e-9;
 constexpr double kFirstDamping = 1e-4;
 constexpr double kDampingFactor = 10.0;
 constexpr double kMaxDamping = 1e8;
+/// Undamped steps in a row that may raise the cost over the best so far.
+constexpr std::uint32_t kPatience = 4;
 
 /// Graduated non-convexity: the factor of its control parameter (Yang et al. 2020), and where the surrogate is so close
 /// to the truncated quadratic that the latter takes over.
@@ -33,6 +35,7 @@ Status Optimiser::init(const PoseGraphConfig& config, const Memory& memory) {
   }
   if (memory.pairs.size() < config.max_edges || memory.weights.size() < config.max_edges ||
       memory.poses.size() < config.max_nodes || memory.trial.size() < config.max_nodes ||
+      memory.best.size() < config.max_nodes ||
       memory.vectors.size() < kVectors * 3 * static_cast<std::size_t>(config.max_nodes)) {
     return Status::insufficient_memory;
   }
@@ -67,6 +70,8 @@ Status Optimiser::begin(PoseGraph& graph, const OptimiserOptions& options) {
   revision_ = graph.revision();
   direct_ = true;
   damping_ = 0.0;
+  astray_ = false;
+  patience_ = kPatience;
   restore();
   for (EdgeId id = 0; id < edges_; ++id) {
     memory_.weights[id] = 1.0;
@@ -326,6 +331,8 @@ void Optimiser::try_step() {
   const double chi2 = cost(memory_.trial);
   if (is_finite(chi2) && chi2 <= chi2_ * (1.0 + kRounding)) {
     accept(chi2);
+  } else if (is_finite(chi2) && damping_ == 0.0 && patience_ > 0) {
+    go_astray();
   } else {
     reject();
   }
@@ -333,6 +340,8 @@ void Optimiser::try_step() {
 
 void Optimiser::accept(double chi2) {
   std::swap(memory_.poses, memory_.trial);
+  astray_ = false;
+  patience_ = patience_ > 0 ? kPatience : 0;
   const bool small = chi2_ - chi2 <= options_.tolerance * chi2;
   const bool undamped = damping_ <= kFirstDamping;
   chi2_ = chi2;
@@ -346,7 +355,28 @@ void Optimiser::accept(double chi2) {
   }
 }
 
+/// Goes on from a worse pose, as Gauss-Newton may have to cross a ridge; the best is kept (a watchdog: Chamberlain,
+/// Powell, Lemarechal, Pedersen 1982).
+void Optimiser::go_astray() {
+  if (!astray_) {
+    std::swap(memory_.best, memory_.poses);
+    astray_ = true;
+  }
+  std::swap(memory_.poses, memory_.trial);
+  --patience_;
+  phase_ = Phase::assemble;
+  if (report_.iterations >= options_.max_iterations) {
+    finish_poses();
+  }
+}
+
+/// Back to the best poses, with more damping.
 void Optimiser::reject() {
+  if (astray_) {
+    std::swap(memory_.best, memory_.poses);
+    astray_ = false;
+  }
+  patience_ = 0;
   damping_ = damping_ == 0.0 ? kFirstDamping : damping_ * kDampingFactor;
   phase_ = Phase::assemble;
   if (damping_ > kMaxDamping || report_.iterations >= options_.max_iterations) {
@@ -356,6 +386,10 @@ void Optimiser::reject() {
 }
 
 void Optimiser::finish_poses() {
+  if (astray_) {
+    std::swap(memory_.best, memory_.poses);
+    astray_ = false;
+  }
   report_.chi2_final = chi2_;
   damping_ = 0.0;
   stage_ = Stage::marginals;

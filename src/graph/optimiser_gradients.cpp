@@ -11,7 +11,7 @@ namespace {
 using graph_detail::EdgeTerms;
 
 /// The residual, in the preconditioner's norm, is to shrink by the square root of this.
-constexpr double kResidualReduction = 1e-20;
+constexpr double kResidualReduction = 1e-14;
 
 double dot(Span<const double> a, Span<const double> b) {
   double sum = 0.0;

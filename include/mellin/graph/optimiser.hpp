@@ -5,7 +5,8 @@
 // Tron, Daniilidis, Dellaert 2015): rotations as unit vectors by one linear solve, then translations by a second. From
 // bad odometry damped descent gets lost; from the chordal start Gauss-Newton finds the optimum.
 //
-// Iteration. Gauss-Newton; a step that does not reduce the cost is undone and repeated with Marquardt's damping.
+// Iteration. Gauss-Newton, which may pass through a few worse poses on its way (on INTEL it does); where that does not
+// lead below the best, back to the best with Marquardt's damping.
 //
 // Robust kernel: truncated least squares by graduated non-convexity (Yang, Antonante, Tzoumas, Carlone 2020), on loop
 // and merge edges only, since odometry edges are known inliers. Truncated, because its weights end at 0 or 1: what is
@@ -40,9 +41,9 @@ enum class Start : std::uint8_t {
 
 struct OptimiserOptions {
   Start start = Start::current;
-  std::uint32_t max_iterations = 50;  ///< linear solves; 0 with `marginals`: only factorise at the current poses
-  double tolerance = 1e-6;            ///< converged when a step reduces chi2 by less than this share of it
-  bool robust = false;                ///< truncated least squares on loop and merge edges
+  std::uint32_t max_iterations = 100;  ///< linear solves; 0 with `marginals`: only factorise at the current poses
+  double tolerance = 1e-6;             ///< converged when a step reduces chi2 by less than this share of it
+  bool robust = false;                 ///< truncated least squares on loop and merge edges
   /// Errors whose chi2 is over this are outliers; 11.34 is the 99 % quantile with three degrees of freedom.
   double robust_chi2 = 11.345;
   bool marginals = false;  ///< factorise once more at the final poses, for relative_covariance()
@@ -68,6 +69,7 @@ class Optimiser {
     Span<double> weights;
     Span<Pose2> poses;
     Span<Pose2> trial;
+    Span<Pose2> best;
     Span<double> vectors;
   };
 
@@ -79,6 +81,7 @@ class Optimiser {
     memory.weights = arena.template take<double>(config.max_edges, Part::graph);
     memory.poses = arena.template take<Pose2>(config.max_nodes, Part::graph);
     memory.trial = arena.template take<Pose2>(config.max_nodes, Part::graph);
+    memory.best = arena.template take<Pose2>(config.max_nodes, Part::graph);
     memory.vectors =
         arena.template take<double>(kVectors * 3 * static_cast<std::size_t>(config.max_nodes), Part::graph);
     return memory;
@@ -139,6 +142,7 @@ class Optimiser {
   void set_translations();
   void try_step();
   void accept(double chi2);
+  void go_astray();
   void reject();
   void begin_poses();
   void finish_poses();
@@ -165,6 +169,7 @@ class Optimiser {
   std::uint32_t edges_ = 0;
   std::uint32_t revision_ = 0;
   std::uint32_t gradient_steps_ = 0;
+  std::uint32_t patience_ = 0;
   double chi2_ = 0.0;
   double damping_ = 0.0;
   double control_ = 0.0;
@@ -173,6 +178,7 @@ class Optimiser {
   bool kernel_done_ = true;
   bool direct_ = true;
   bool factored_ = false;
+  bool astray_ = false;
 };
 
 }  // namespace mellin
