@@ -4,4 +4,8 @@
 
 #include <CLI/CLI.hpp>
 
-namespace mellin::program {}  // namespace mellin::program
+namespace mellin::program {
+
+void add_optimize(CLI::App& app);
+
+}  // namespace mellin::program

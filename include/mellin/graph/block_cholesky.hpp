@@ -107,10 +107,11 @@ class BlockOrdering {
   std::uint32_t slot(std::uint32_t pair) const { return memory_.slots[pair]; }
   std::uint32_t begin_of(std::uint32_t column) const { return memory_.begin[column]; }
   std::uint32_t row(std::uint32_t block) const { return memory_.rows[block]; }
+  Span<const std::uint32_t> rows() const { return memory_.rows; }
   /// The next column that depends on this one (its parent in the elimination tree); variables() for a root.
   std::uint32_t parent(std::uint32_t column) const;
 
-  /// Work space of the analysis that is free after it, an index a variable each; Cholesky borrows it.
+  /// Work space of the analysis that is free after it, an index a variable each (which: 0 to 3); Cholesky borrows it.
   Span<std::uint32_t> scratch(std::uint32_t which) const;
 
  private:

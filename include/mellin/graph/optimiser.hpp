@@ -5,7 +5,8 @@
 // Tron, Daniilidis, Dellaert 2015): rotations as unit vectors by one linear solve, then translations by a second. From
 // bad odometry damped descent gets lost; from the chordal start Gauss-Newton finds the optimum.
 //
-// Iteration. Gauss-Newton; a step that does not reduce the cost is undone and repeated with Marquardt's damping.
+// Iteration. Gauss-Newton, which may pass through a few worse poses on its way (on INTEL it does); where that does not
+// lead below the best, back to the best with Marquardt's damping.
 //
 // Robust kernel: truncated least squares by graduated non-convexity (Yang, Antonante, Tzoumas, Carlone 2020), on loop
 // and merge edges only, since odometry edges are known inliers. Truncated, because its weights end at 0 or 1: what is
@@ -29,6 +30,10 @@
 
 namespace mellin {
 
+namespace graph_detail {
+struct EdgeTerms;
+}
+
 enum class Start : std::uint8_t {
   current,  ///< from the graph's poses
   chordal,  ///< from the edges alone
@@ -36,9 +41,9 @@ enum class Start : std::uint8_t {
 
 struct OptimiserOptions {
   Start start = Start::current;
-  std::uint32_t max_iterations = 50;  ///< linear solves; 0 with `marginals`: only factorise at the current poses
-  double tolerance = 1e-6;            ///< converged when a step reduces chi2 by less than this share of it
-  bool robust = false;                ///< truncated least squares on loop and merge edges
+  std::uint32_t max_iterations = 100;  ///< linear solves; 0 with `marginals`: only factorise at the current poses
+  double tolerance = 1e-6;             ///< converged when a step reduces chi2 by less than this share of it
+  bool robust = false;                 ///< truncated least squares on loop and merge edges
   /// Errors whose chi2 is over this are outliers; 11.34 is the 99 % quantile with three degrees of freedom.
   double robust_chi2 = 11.345;
   bool marginals = false;  ///< factorise once more at the final poses, for relative_covariance()
@@ -64,6 +69,7 @@ class Optimiser {
     Span<double> weights;
     Span<Pose2> poses;
     Span<Pose2> trial;
+    Span<Pose2> best;
     Span<double> vectors;
   };
 
@@ -75,6 +81,7 @@ class Optimiser {
     memory.weights = arena.template take<double>(config.max_edges, Part::graph);
     memory.poses = arena.template take<Pose2>(config.max_nodes, Part::graph);
     memory.trial = arena.template take<Pose2>(config.max_nodes, Part::graph);
+    memory.best = arena.template take<Pose2>(config.max_nodes, Part::graph);
     memory.vectors =
         arena.template take<double>(kVectors * 3 * static_cast<std::size_t>(config.max_nodes), Part::graph);
     return memory;
@@ -106,42 +113,49 @@ class Optimiser {
   Result<Sym3> relative_covariance(NodeId a, NodeId b);
 
  private:
-  static constexpr std::size_t kVectors = 4;
+  /// Vectors of three doubles a node: right-hand side and residual, solution, search direction, its image, diagonal.
+  static constexpr std::size_t kVectors = 5;
   enum class Stage : std::uint8_t { rotations, translations, poses, marginals };
-  enum class Phase : std::uint8_t { idle, order, assemble, factorise, solve, iterate, update, write };
-  struct EdgeTerms;
+  enum class Phase : std::uint8_t { idle, order, assemble, factorise, gradients, update, write };
 
   static constexpr BlockCholeskyLimits limits(const PoseGraphConfig& config) {
     return {config.max_nodes, config.max_edges, config.max_fill};
   }
   bool fixed(NodeId node) const { return graph_->component(node) == node; }
+  bool in_system(const Edge& edge) const { return edge.enabled && !(fixed(edge.a) && fixed(edge.b)); }
+  bool under_kernel(const Edge& edge) const { return edge.enabled && edge.kind != EdgeKind::odometry; }
   Span<double> vector(std::size_t which) const;
-  EdgeTerms edge_terms(const Edge& edge, double weight) const;
+  graph_detail::EdgeTerms terms(EdgeId id) const;
+  double edge_cost(EdgeId id, Span<const Pose2> poses) const;
+  double cost(Span<const Pose2> poses) const;
 
   void connect_all();
   void connect_tree();
   void order();
   void assemble();
-  void assemble_edge(EdgeId id, Span<double> gradient);
+  void add_to_matrix(EdgeId id, const graph_detail::EdgeTerms& t);
   void factorise();
-  void solve();
-  void multiply(Span<const double> x, Span<double> out) const;
-  void begin_gradients();
-  bool iterate_gradients();
-  void precondition();
+  void give_way();
+  void restore();
   void update();
   void set_rotations();
   void set_translations();
   void try_step();
   void accept(double chi2);
+  void go_astray();
   void reject();
   void begin_poses();
   void finish_poses();
   void write();
-  double cost(Span<const Pose2> poses) const;
+
+  void multiply(Span<const double> x, Span<double> out) const;
+  void precondition();
+  void begin_gradients();
+  bool iterate_gradients();
+  Result<Sym3> covariance_by_gradients(NodeId a, const Block3& by_a, NodeId b, const Block3& by_b);
+
   void begin_kernel();
-  bool tighten_kernel();
-  void weigh();
+  bool weigh();
 
   Memory memory_;
   PoseGraphConfig config_;
@@ -155,13 +169,16 @@ class Optimiser {
   std::uint32_t edges_ = 0;
   std::uint32_t revision_ = 0;
   std::uint32_t gradient_steps_ = 0;
+  std::uint32_t patience_ = 0;
   double chi2_ = 0.0;
   double damping_ = 0.0;
-  double sharpness_ = 0.0;
+  double control_ = 0.0;
   double rho_ = 0.0;
   double rho_stop_ = 0.0;
+  bool kernel_done_ = true;
   bool direct_ = true;
   bool factored_ = false;
+  bool astray_ = false;
 };
 
 }  // namespace mellin
