@@ -8,7 +8,8 @@ namespace {
 
 constexpr std::uint8_t kBeyond = 255;      // field value: no obstacle within capture_m
 constexpr float kUnitsAtCapture = 254.0F;  // field value at capture_m
-constexpr float kStageShrink = 0.7F;       // each iteration narrows the reach by this, down to final_m
+constexpr float kStageShrink = 0.9F;       // each iteration narrows the reach by this, down to final_m
+constexpr float kSecondWayReach = 2.0F;    // reach at the start of the second way, in final_m
 constexpr double kDamping = 1e-3;          // least share of the mean stiffness added to each axis
 constexpr double kDampingStep = 8.0;       // it grows by this where a step makes things worse, and shrinks again
 constexpr double kConvergedXy = 1e-3;      // m
@@ -103,7 +104,10 @@ Point2f wall_normal(const GridView& grid, int column, int row, int reach, std::u
   return {normal.x / length, normal.y / length};
 }
 
-void add_witness(Sym3& sum, const AlignmentPoint& p, float nx, float ny, double weight) {
+/// Adds the residual of a point across its normal to a stiffness over (x, y, theta).
+void add_witness(Sym3& sum, const AlignmentPoint& p, double weight) {
+  const float nx = p.normal_x;
+  const float ny = p.normal_y;
   const float lever = p.x * ny - p.y * nx;
   sum.xx += weight * static_cast<double>(nx * nx);
   sum.xy += weight * static_cast<double>(nx * ny);
@@ -117,6 +121,8 @@ Pose2 multiply(const Sym3& m, const Pose2& v) {
   return {m.xx * v.x + m.xy * v.y + m.xt * v.theta, m.xy * v.x + m.yy * v.y + m.yt * v.theta,
           m.xt * v.x + m.yt * v.y + m.tt * v.theta};
 }
+
+double hypotenuse(double a, double b) { return std::sqrt(a * a + b * b); }
 
 /// Information of a measurement with information `m` and an independent error of covariance diag(xx, xx, tt) on top:
 /// (m^-1 + S)^-1 = m - m (m + S^-1)^-1 m, which a singular m does not disturb.
@@ -155,21 +161,29 @@ Status Alignment::begin(const GridView& a, const GridView& b, const Pose2& a_T_b
   if (memory_.field.empty() || !valid(a, config_.max_side) || !valid(b, config_.max_side) || !is_finite(a_T_b)) {
     return Status::invalid_argument;
   }
-  a_ = a;
-  b_ = b;
-  a_T_b_ = a_T_b;
+  result_ = {};
+  result_.converged = true;
+  evidence_ = {};
+  backward_ = false;
+  start_way(a, b, a_T_b, config_.capture_m);
+  return Status::ok;
+}
+
+void Alignment::start_way(GridView onto, GridView from, const Pose2& onto_T_from, float reach_m) {
+  onto_ = onto;
+  from_ = from;
+  onto_T_from_ = onto_T_from;
+  trial_ = onto_T_from;
+  reach_m_ = reach_m;
+  iterations_ = 0;
+  damping_ = kDamping;
+  settled_ = false;
   row_ = 0;
   obstacles_ = 0;
   seen_ = 0;
   point_count_ = 0;
-  reach_m_ = config_.capture_m;
-  trial_ = a_T_b;
-  damping_ = kDamping;
-  settled_ = false;
-  result_ = {};
   std::fill(memory_.field.begin(), memory_.field.end(), kBeyond);
   stage_ = Stage::field;
-  return Status::ok;
 }
 
 bool Alignment::step() {
@@ -205,29 +219,29 @@ void Alignment::advance(const GridView& grid, int end, Stage next) {
 int Alignment::slice_end(const GridView& grid) const { return std::min<int>(grid.side, row_ + config_.rows_per_step); }
 
 void Alignment::build_field() {
-  const int end = slice_end(a_);
+  const int end = slice_end(onto_);
   for (int row = row_; row < end; ++row) {
-    for (int column = 0; column < a_.side; ++column) {
-      if (occupied(a_, column, row, config_.occupied_from)) {
-        stamp_distance(centre_of_hits(a_, column, row));
+    for (int column = 0; column < onto_.side; ++column) {
+      if (occupied(onto_, column, row, config_.occupied_from)) {
+        stamp_distance(centre_of_hits(onto_, column, row));
       }
     }
   }
-  advance(a_, end, Stage::count);
+  advance(onto_, end, Stage::count);
 }
 
 /// Lowers the field to the distance from an obstacle (cells from the corner) wherever that is nearer.
 void Alignment::stamp_distance(const Point2f& obstacle) {
-  const float reach = config_.capture_m / a_.cell_m;
+  const float reach = config_.capture_m / onto_.cell_m;
   const float units = kUnitsAtCapture / reach;
-  const auto limit = static_cast<float>(a_.side - 1);
+  const auto limit = static_cast<float>(onto_.side - 1);
   const int first_column = static_cast<int>(std::max(0.0F, obstacle.x - reach));
   const int last_column = static_cast<int>(std::min(limit, obstacle.x + reach));
   const int first_row = static_cast<int>(std::max(0.0F, obstacle.y - reach));
   const int last_row = static_cast<int>(std::min(limit, obstacle.y + reach));
   for (int row = first_row; row <= last_row; ++row) {
     const float dy = (static_cast<float>(row) + 0.5F - obstacle.y) * units;
-    std::uint8_t* const cells = memory_.field.data() + static_cast<std::size_t>(row) * a_.side;
+    std::uint8_t* const cells = memory_.field.data() + static_cast<std::size_t>(row) * onto_.side;
     for (int column = first_column; column <= last_column; ++column) {
       const float dx = (static_cast<float>(column) + 0.5F - obstacle.x) * units;
       const float squared = dx * dx + dy * dy;
@@ -240,23 +254,23 @@ void Alignment::stamp_distance(const Point2f& obstacle) {
 }
 
 void Alignment::count_obstacles() {
-  const int end = slice_end(b_);
+  const int end = slice_end(from_);
   for (int row = row_; row < end; ++row) {
-    for (int column = 0; column < b_.side; ++column) {
-      obstacles_ += occupied(b_, column, row, config_.occupied_from) ? 1U : 0U;
+    for (int column = 0; column < from_.side; ++column) {
+      obstacles_ += occupied(from_, column, row, config_.occupied_from) ? 1U : 0U;
     }
   }
-  advance(b_, end, Stage::points);
+  advance(from_, end, Stage::points);
 }
 
 void Alignment::collect_points() {
-  const int end = slice_end(b_);
+  const int end = slice_end(from_);
   const std::uint32_t wanted = std::min<std::uint32_t>(obstacles_, config_.max_points);
-  const int reach = std::max(1, static_cast<int>(kNormalWindow_m / b_.cell_m));
-  const float half = 0.5F * static_cast<float>(b_.side);
+  const int reach = std::max(1, static_cast<int>(kNormalWindow_m / from_.cell_m));
+  const float half = 0.5F * static_cast<float>(from_.side);
   for (int row = row_; row < end; ++row) {
-    for (int column = 0; column < b_.side; ++column) {
-      if (!occupied(b_, column, row, config_.occupied_from)) {
+    for (int column = 0; column < from_.side; ++column) {
+      if (!occupied(from_, column, row, config_.occupied_from)) {
         continue;
       }
       // Obstacle k is taken where k * wanted / obstacles steps up: evenly, and exactly `wanted` of them.
@@ -265,32 +279,32 @@ void Alignment::collect_points() {
       if (due == point_count_) {
         continue;
       }
-      const Point2f at = centre_of_hits(b_, column, row);
-      const Point2f normal = wall_normal(b_, column, row, reach, config_.occupied_from);
-      memory_.points[point_count_++] = {(at.x - half) * b_.cell_m, (at.y - half) * b_.cell_m, normal.x, normal.y};
+      const Point2f at = centre_of_hits(from_, column, row);
+      const Point2f normal = wall_normal(from_, column, row, reach, config_.occupied_from);
+      memory_.points[point_count_++] = {(at.x - half) * from_.cell_m, (at.y - half) * from_.cell_m, normal.x, normal.y};
     }
   }
-  advance(b_, end, Stage::iterate);
+  advance(from_, end, Stage::iterate);
 }
 
 /// Distance field and its gradient at a point of a, bilinear between the centres of four cells.
 Alignment::Sample Alignment::sample(float x_m, float y_m) const {
-  const float half = 0.5F * static_cast<float>(a_.side) - 0.5F;
-  const float x = x_m / a_.cell_m + half;
-  const float y = y_m / a_.cell_m + half;
-  const auto limit = static_cast<float>(a_.side - 1);
+  const float half = 0.5F * static_cast<float>(onto_.side) - 0.5F;
+  const float x = x_m / onto_.cell_m + half;
+  const float y = y_m / onto_.cell_m + half;
+  const auto limit = static_cast<float>(onto_.side - 1);
   if (!(x >= 0.0F && y >= 0.0F && x < limit && y < limit)) {
     return {};
   }
   const auto column = static_cast<std::size_t>(x);
   const auto row = static_cast<std::size_t>(y);
-  const std::size_t at = row * a_.side + column;
+  const std::size_t at = row * onto_.side + column;
   const std::uint8_t v00 = memory_.field[at];
   const std::uint8_t v10 = memory_.field[at + 1];
-  const std::uint8_t v01 = memory_.field[at + a_.side];
-  const std::uint8_t v11 = memory_.field[at + a_.side + 1];
+  const std::uint8_t v01 = memory_.field[at + onto_.side];
+  const std::uint8_t v11 = memory_.field[at + onto_.side + 1];
   Sample sample;
-  sample.observed = a_.cells[at] != kUnobserved;
+  sample.observed = onto_.cells[at] != kUnobserved;
   if (v00 == kBeyond || v10 == kBeyond || v01 == kBeyond || v11 == kBeyond) {
     return sample;
   }
@@ -302,18 +316,18 @@ Alignment::Sample Alignment::sample(float x_m, float y_m) const {
   sample.near = true;
   sample.distance_m = (low + fy * (high - low)) * metres;
   sample.gradient_x =
-      (static_cast<float>(v10 - v00) * (1.0F - fy) + static_cast<float>(v11 - v01) * fy) * metres / a_.cell_m;
-  sample.gradient_y = (high - low) * metres / a_.cell_m;
+      (static_cast<float>(v10 - v00) * (1.0F - fy) + static_cast<float>(v11 - v01) * fy) * metres / onto_.cell_m;
+  sample.gradient_y = (high - low) * metres / onto_.cell_m;
   return sample;
 }
 
 /// Robust cost at the trial pose with its Gauss-Newton system: Tukey's biweight, in iteratively reweighted form.
-Alignment::System Alignment::linearise(const Pose2& a_T_b) const {
-  const SinCos turn = sincos(a_T_b.theta);
+Alignment::System Alignment::linearise(const Pose2& onto_T_from) const {
+  const SinCos turn = sincos(onto_T_from.theta);
   const auto c = static_cast<float>(turn.cos);
   const auto s = static_cast<float>(turn.sin);
-  const auto tx = static_cast<float>(a_T_b.x);
-  const auto ty = static_cast<float>(a_T_b.y);
+  const auto tx = static_cast<float>(onto_T_from.x);
+  const auto ty = static_cast<float>(onto_T_from.y);
   const float reach2 = reach_m_ * reach_m_;
   System system;
   for (std::size_t i = 0; i < point_count_; ++i) {
@@ -329,7 +343,7 @@ Alignment::System Alignment::linearise(const Pose2& a_T_b) const {
     const float inside = 1.0F - d2 / reach2;
     const float tukey = inside * inside;
     system.cost += static_cast<double>(1.0F - tukey * inside);
-    add_witness(system.stiffness, p, gx, gy, static_cast<double>(tukey));
+    add_witness(system.stiffness, {p.x, p.y, gx, gy}, static_cast<double>(tukey));
     const float force = tukey * at.distance_m;
     system.pull.x -= static_cast<double>(force * gx);
     system.pull.y -= static_cast<double>(force * gy);
@@ -343,66 +357,95 @@ Alignment::System Alignment::linearise(const Pose2& a_T_b) const {
 void Alignment::iterate() {
   const bool last_stage = reach_m_ <= config_.final_m;
   const System trial = linearise(trial_);
-  ++result_.iterations;
-  if (last_stage && settled_ && trial.cost > best_.cost) {
+  ++iterations_;
+  if (settled_ && trial.cost > best_.cost) {
     damping_ *= kDampingStep;
   } else {
     best_ = trial;
-    a_T_b_ = trial_;
+    onto_T_from_ = trial_;
     damping_ = std::max(kDamping, damping_ / kDampingStep);
     settled_ = last_stage;
   }
   const double xy = damping_ * 0.5 * (best_.stiffness.xx + best_.stiffness.yy);
   Sym3 inner;
   if (!invert(best_.stiffness + diagonal(xy, xy, damping_ * best_.stiffness.tt), inner)) {
-    finish();
+    finish_way(false);
     return;
   }
   const Pose2 move = multiply(inner, best_.pull);
-  trial_ = compose(a_T_b_, move);
-  result_.converged = last_stage && translation(move) < kConvergedXy && std::fabs(move.theta) < kConvergedTheta;
-  if (result_.converged || result_.iterations >= config_.max_iterations) {
-    finish();
+  trial_ = compose(onto_T_from_, move);
+  const bool converged = last_stage && translation(move) < kConvergedXy && std::fabs(move.theta) < kConvergedTheta;
+  if (converged || iterations_ >= config_.max_iterations) {
+    finish_way(converged);
+    return;
   }
   reach_m_ = std::max(config_.final_m, reach_m_ * kStageShrink);
 }
 
-/// Evidence at the final pose.
-void Alignment::finish() {
-  const SinCos turn = sincos(a_T_b_.theta);
+/// Adds the evidence of the way that has ended, and starts the other one or ends the job.
+void Alignment::finish_way(bool converged) {
+  result_.converged = result_.converged && converged;
+  result_.iterations = static_cast<std::uint16_t>(result_.iterations + iterations_);
+  result_.points = static_cast<std::uint16_t>(result_.points + point_count_);
+  add_evidence();
+  if (!backward_) {
+    result_.a_T_b = onto_T_from_;
+    if (config_.both_ways) {
+      backward_ = true;
+      start_way(from_, onto_, inverse(onto_T_from_), std::min(config_.capture_m, kSecondWayReach * config_.final_m));
+      return;
+    }
+  } else {
+    const Pose2 apart = between(result_.a_T_b, inverse(onto_T_from_));
+    result_.disagreement_m = static_cast<float>(translation(apart));
+    result_.disagreement_rad = static_cast<float>(std::fabs(apart.theta));
+    result_.a_T_b = compose(result_.a_T_b, {0.5 * apart.x, 0.5 * apart.y, 0.5 * apart.theta});
+  }
+  summarise();
+}
+
+/// Counts the inliers at the pose that this way has found; each wall point among them is a witness of b's pose across
+/// the wall.
+void Alignment::add_evidence() {
+  const SinCos turn = sincos(onto_T_from_.theta);
   const auto c = static_cast<float>(turn.cos);
   const auto s = static_cast<float>(turn.sin);
-  // Points within correlation_m of wall count as one witness.
+  const auto tx = static_cast<float>(onto_T_from_.x);
+  const auto ty = static_cast<float>(onto_T_from_.y);
+  // All points within correlation_m of wall are one witness, and both ways see the same walls.
   const double cells_a_point =
       point_count_ > 0 ? static_cast<double>(obstacles_) / static_cast<double>(point_count_) : 1.0;
+  const double metres_a_point = cells_a_point * static_cast<double>(from_.cell_m);
   const double sigma = static_cast<double>(config_.point_sigma_m);
-  const double weight =
-      std::min(1.0, cells_a_point * static_cast<double>(b_.cell_m) / static_cast<double>(config_.correlation_m)) /
-      (sigma * sigma);
-  std::uint32_t inliers = 0;
-  std::uint32_t shared = 0;
-  double squares = 0.0;
-  Sym3 information;
+  const double weight = std::min(1.0, metres_a_point / static_cast<double>(config_.correlation_m)) / (sigma * sigma) *
+                        (config_.both_ways ? 0.5 : 1.0);
   for (std::size_t i = 0; i < point_count_; ++i) {
-    const AlignmentPoint& p = memory_.points[i];
-    const Sample at =
-        sample(c * p.x - s * p.y + static_cast<float>(a_T_b_.x), s * p.x + c * p.y + static_cast<float>(a_T_b_.y));
+    AlignmentPoint p = memory_.points[i];
+    const AlignmentPoint there{c * p.x - s * p.y + tx, s * p.x + c * p.y + ty, c * p.normal_x - s * p.normal_y,
+                               s * p.normal_x + c * p.normal_y};
+    const Sample at = sample(there.x, there.y);
     const bool inlier = at.near && at.distance_m < config_.final_m;
-    shared += at.observed || inlier ? 1U : 0U;
-    if (!inlier) {
-      continue;
+    evidence_.shared += at.observed || inlier ? 1U : 0U;
+    if (inlier) {
+      ++evidence_.inliers;
+      evidence_.squares += static_cast<double>(at.distance_m * at.distance_m);
+      // Witnesses speak in b's frame: it is the points' own on the first way, that of the field on the second.
+      add_witness(evidence_.information, backward_ ? there : p, weight);
     }
-    ++inliers;
-    squares += static_cast<double>(at.distance_m * at.distance_m);
-    add_witness(information, p, p.normal_x, p.normal_y, weight);
   }
-  result_.a_T_b = a_T_b_;
-  result_.points = static_cast<std::uint16_t>(point_count_);
-  inliers_ = inliers;
-  result_.inlier_share = shared > 0 ? static_cast<float>(inliers) / static_cast<float>(shared) : 0.0F;
-  result_.rms_m = inliers > 0 ? static_cast<float>(std::sqrt(squares / inliers)) : 0.0F;
-  result_.information =
-      with_floor(information, static_cast<double>(config_.floor_xy_m), static_cast<double>(config_.floor_theta_rad));
+}
+
+void Alignment::summarise() {
+  const Evidence& e = evidence_;
+  result_.inlier_share = e.shared > 0 ? static_cast<float>(e.inliers) / static_cast<float>(e.shared) : 0.0F;
+  result_.rms_m = e.inliers > 0 ? static_cast<float>(std::sqrt(e.squares / e.inliers)) : 0.0F;
+  const double xy =
+      hypotenuse(static_cast<double>(config_.floor_xy_m), 0.5 * static_cast<double>(result_.disagreement_m));
+  const double theta =
+      hypotenuse(static_cast<double>(config_.floor_theta_rad), 0.5 * static_cast<double>(result_.disagreement_rad));
+  // The fewer points find an obstacle, the more of those that do have found it by chance.
+  const double trust = static_cast<double>(result_.inlier_share) * static_cast<double>(result_.inlier_share);
+  result_.information = with_floor(scale(e.information, trust), xy, theta);
   stage_ = Stage::done;
 }
 
@@ -410,7 +453,7 @@ Result<AlignmentResult> Alignment::result() const {
   if (stage_ != Stage::done) {
     return Status::busy;
   }
-  if (inliers_ < kFewestInliers) {
+  if (evidence_.inliers < kFewestInliers) {
     return Status::degenerate;
   }
   return result_;

@@ -19,17 +19,18 @@
 namespace mellin {
 
 struct AlignmentConfig {
-  std::uint16_t max_side = 768;      ///< cells; the largest grid that begin() takes (a byte each)
-  std::uint16_t max_points = 4096;   ///< obstacle points used, spread evenly when there are more (20 bytes each)
-  std::uint16_t rows_per_step = 32;  ///< grid rows that one step() works on while it builds the field or the points
-  std::uint16_t max_iterations = 40;
-  std::uint8_t occupied_from = 64;  ///< a cell is an obstacle from this many 254ths of hits per observation on
-  float capture_m = 0.8F;           ///< reach of the distance field: points further from any obstacle exert no pull
-  float final_m = 0.15F;            ///< reach in the last stage: points further away are outliers
-  float point_sigma_m = 0.05F;      ///< deviation of a point from its obstacle where the pose is right …
-  float correlation_m = 0.5F;       ///< … correlated over this length of wall: as many points are one witness
-  float floor_xy_m = 0.015F;        ///< deviation that no number of points gets below: submaps are not quite rigid …
-  float floor_theta_rad = 0.0025F;  ///< … the same of the heading
+  std::uint16_t max_side = 768;       ///< cells; the largest grid that begin() takes (a byte each)
+  std::uint16_t max_points = 4096;    ///< obstacle points used, spread evenly when there are more (20 bytes each)
+  std::uint16_t rows_per_step = 32;   ///< grid rows that one step() works on while it builds the field or the points
+  std::uint16_t max_iterations = 64;  ///< each way
+  std::uint8_t occupied_from = 64;    ///< a cell is an obstacle from this many 254ths of hits per observation on
+  bool both_ways = true;              ///< then align a on b as well and take the mean: more exact, and a check
+  float capture_m = 1.0F;             ///< reach of the distance field: points further from any obstacle exert no pull
+  float final_m = 0.15F;              ///< reach in the last stage: points further away are outliers
+  float point_sigma_m = 0.05F;        ///< deviation of a point from its obstacle where the pose is right …
+  float correlation_m = 0.5F;         ///< … correlated over this length of wall: as many points are one witness
+  float floor_xy_m = 0.02F;        ///< deviation that no number of points gets below: submaps are not quite rigid …
+  float floor_theta_rad = 0.004F;  ///< … the same of the heading
 };
 
 /// An obstacle point in the frame of its submap.
@@ -45,11 +46,13 @@ struct AlignmentResult {
   /// Information of the measurement Z = a_T_b over e = (x, y, theta) of Z^-1 (w_T_a^-1 w_T_b), in Z's own frame (axes
   /// of b), as EDGE_SE2 of g2o has it. Along a corridor its stiffness goes to zero: it is positive semidefinite.
   Sym3 information;
-  bool converged = false;  ///< the last step was below 1 mm and 0.2 mrad in the last stage
-  std::uint16_t iterations = 0;
-  std::uint16_t points = 0;   ///< of b that took part
-  float inlier_share = 0.0F;  ///< of the points that fall where a observed: closer than final_m to an obstacle
+  bool converged = false;        ///< the last step (of each way) was below 1 mm and 0.2 mrad in the last stage
+  std::uint16_t iterations = 0;  ///< of both ways
+  std::uint16_t points = 0;      ///< that took part, of both ways
+  float inlier_share = 0.0F;  ///< of the points that fall where the other observed: closer than final_m to an obstacle
   float rms_m = 0.0F;         ///< distance of the inliers to their obstacles
+  float disagreement_m = 0.0F;  ///< between the results of both ways; large where the minimum is false or not unique
+  float disagreement_rad = 0.0F;
 };
 
 /// One alignment at a time in memory given once. begin(), then step() until it returns false, then result().
@@ -95,13 +98,21 @@ class Alignment {
     float gradient_y = 0.0F;
   };
 
-  /// Gauss-Newton system over e = (x, y, theta) on the right of a_T_b.
+  /// Gauss-Newton system over e = (x, y, theta) on the right of onto_T_from.
   struct System {
     double cost = 0.0;  ///< robust: 0 a point on an obstacle, 1 a point out of reach
     Sym3 stiffness;
     Pose2 pull;
   };
 
+  struct Evidence {
+    std::uint32_t shared = 0;  ///< points that fall where the other submap observed
+    std::uint32_t inliers = 0;
+    double squares = 0.0;  ///< of the inliers' distances, m^2
+    Sym3 information;      ///< over e on the right of a_T_b
+  };
+
+  void start_way(GridView onto, GridView from, const Pose2& onto_T_from, float reach_m);
   int slice_end(const GridView& grid) const;
   void advance(const GridView& grid, int end, Stage next);
   void build_field();
@@ -109,26 +120,30 @@ class Alignment {
   void count_obstacles();
   void collect_points();
   Sample sample(float x_m, float y_m) const;
-  System linearise(const Pose2& a_T_b) const;
+  System linearise(const Pose2& onto_T_from) const;
   void iterate();
-  void finish();
+  void finish_way(bool converged);
+  void add_evidence();
+  void summarise();
 
   AlignmentConfig config_;
   Memory memory_;
-  GridView a_;
-  GridView b_;
-  Pose2 a_T_b_;  ///< best so far …
-  System best_;  ///< … and the system there
-  Pose2 trial_;  ///< to be tried next
-  double damping_ = 0.0;
-  bool settled_ = false;  ///< best_ belongs to the last stage
+  GridView onto_;  ///< whose obstacles make the field: a on the first way …
+  GridView from_;  ///< … and whose make the points: b
+  bool backward_ = false;
   Stage stage_ = Stage::idle;
   int row_ = 0;                  ///< next row of the field, or of the points
-  std::uint32_t obstacles_ = 0;  ///< obstacle cells of b …
+  std::uint32_t obstacles_ = 0;  ///< obstacle cells of from_ …
   std::uint32_t seen_ = 0;       ///< … and how many of them collect_points() has passed
   std::size_t point_count_ = 0;
-  float reach_m_ = 0.0F;  ///< of the residuals in the current stage
-  std::uint32_t inliers_ = 0;
+  Pose2 onto_T_from_;     ///< best so far …
+  System best_;           ///< … and the system there
+  Pose2 trial_;           ///< to be tried next
+  float reach_m_ = 0.0F;  ///< of the residuals
+  double damping_ = 0.0;
+  bool settled_ = false;  ///< best_ belongs to the last stage
+  std::uint16_t iterations_ = 0;
+  Evidence evidence_;
   AlignmentResult result_;
 };
 
