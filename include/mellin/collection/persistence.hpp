@@ -1,0 +1,31 @@
+// The map collection's records in the store: nodes and edges, little-endian by definition. The submaps' headers and
+// grids are the store's own; digests are kept as the digest matcher gives them.
+#pragma once
+
+#include <cstdint>
+
+#include "mellin/core/span.hpp"
+#include "mellin/graph/pose_graph.hpp"
+#include "mellin/grid/submap.hpp"
+
+namespace mellin {
+
+/// Kinds of blobs in the store.
+inline constexpr std::uint8_t kDigestRecord = 1;  ///< id: submap
+inline constexpr std::uint8_t kNodeRecord = 2;    ///< id: submap
+inline constexpr std::uint8_t kEdgeRecord = 3;    ///< id: edge
+
+/// 24 bytes: x, y, theta as IEEE 754 doubles.
+inline constexpr std::size_t kNodeRecordBytes = 24;
+std::size_t write_node_record(const Pose2& map_T_submap, Span<std::uint8_t> out);
+/// False where the record is not a finite pose.
+bool read_node_record(Span<const std::uint8_t> bytes, Pose2& map_T_submap);
+
+/// 84 bytes: a, b (32 bits each), kind, enabled (8 bits each), two zero bytes, x, y, theta, then the information
+/// xx, xy, xt, yy, yt, tt as doubles.
+inline constexpr std::size_t kEdgeRecordBytes = 84;
+std::size_t write_edge_record(const Edge& edge, Span<std::uint8_t> out);
+/// False where the record is not an edge; whether its nodes exist is for the graph to say.
+bool read_edge_record(Span<const std::uint8_t> bytes, Edge& edge);
+
+}  // namespace mellin

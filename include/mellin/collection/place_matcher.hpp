@@ -1,0 +1,62 @@
+// What the map collection asks of a method that recognises places: a digest of each submap that can be compared with
+// all others quickly, and a comparison of two full grids that gives poses (paper, Sections III-C and IV; its Section
+// III wants both replaceable). The spectral method is screening.hpp and registration.hpp; another one takes its place
+// by implementing these two interfaces.
+#pragma once
+
+#include <cstdint>
+
+#include "mellin/core/containers.hpp"
+#include "mellin/core/se2.hpp"
+#include "mellin/core/status.hpp"
+#include "mellin/grid/submap.hpp"
+
+namespace mellin {
+
+/// One way in which submap b may lie in submap a.
+struct PlaceHypothesis {
+  Pose2 a_T_b;
+  Sym3 covariance;            ///< of a_T_b over (x, y in a's frame, theta); from registration only
+  float peak = 0.0F;          ///< strength of the match, 0 to 1
+  float agreement = 0.0F;     ///< of what both observed, 0 to 1
+  float overlap = 0.0F;       ///< shared observed area over the smaller one
+  float inlier_share = 0.0F;  ///< of the aligned points; from registration only
+};
+
+inline constexpr std::size_t kMaxPlaceHypotheses = 4;
+/// Best first (by agreement).
+using PlaceHypotheses = FixedList<PlaceHypothesis, kMaxPlaceHypotheses>;
+
+/// Keeps a digest of each submap under an index and compares two of them. One job at a time, in bounded slices.
+class DigestMatcher {
+ public:
+  /// Starts to describe a submap; `grid` must stay until step() says true. Indices may be used again.
+  /// invalid_argument: index or size out of range.
+  virtual Status begin_describe(std::uint32_t index, const GridView& grid) = 0;
+  /// Starts to restore a description from the bytes that digest_bytes() gave.
+  virtual Status begin_restore(std::uint32_t index, Span<const std::uint8_t> digest) = 0;
+  /// Starts to compare two described submaps. invalid_argument; degenerate where one has nothing to compare.
+  virtual Status begin_compare(std::uint32_t a, std::uint32_t b) = 0;
+  /// One slice. True when the job is done.
+  virtual bool step() = 0;
+  virtual const PlaceHypotheses& hypotheses() const = 0;
+  /// What has to be stored to restore a description.
+  virtual Span<const std::uint8_t> digest_bytes(std::uint32_t index) const = 0;
+
+ protected:
+  ~DigestMatcher() = default;
+};
+
+/// Registers two full grids. One job at a time, in bounded slices.
+class GridMatcher {
+ public:
+  /// Starts; both grids must stay until step() says true. invalid_argument: sizes out of range.
+  virtual Status begin(const GridView& a, const GridView& b) = 0;
+  virtual bool step() = 0;
+  virtual const PlaceHypotheses& hypotheses() const = 0;
+
+ protected:
+  ~GridMatcher() = default;
+};
+
+}  // namespace mellin

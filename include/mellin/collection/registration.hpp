@@ -1,0 +1,90 @@
+// Registration of two submaps from their full grids (paper, Sections IV and V-B): Fourier-Mellin at a fine scale, each
+// hypothesis verified, the best ones aligned on the likelihood field and verified again.
+#pragma once
+
+#include <cstdint>
+
+#include "mellin/collection/place_matcher.hpp"
+#include "mellin/core/arena.hpp"
+#include "mellin/grid/digest.hpp"
+#include "mellin/spectral/alignment.hpp"
+#include "mellin/spectral/matcher.hpp"
+#include "mellin/spectral/verification.hpp"
+
+namespace mellin {
+
+struct RegistrationConfig {
+  std::uint16_t grid_side = 768;  ///< of the submaps
+  MatcherConfig matcher;          ///< its side is the scale of registration: grid_side over a power of two
+  VerificationConfig verification;
+  std::uint16_t class_side = 192;  ///< cells of the grids that are compared; divides grid_side
+  AlignmentConfig alignment;
+  std::uint8_t aligned = 2;  ///< hypotheses that are aligned, best agreement first: 1 to kMaxPlaceHypotheses
+};
+
+class SpectralRegistration final : public GridMatcher {
+ public:
+  struct Memory {
+    Matcher::Memory matcher;
+    Features features_a;
+    Features features_b;
+    DigestOut picture;
+    Span<std::uint8_t> classes_a;
+    Span<std::uint8_t> classes_b;
+    Alignment::Memory alignment;
+  };
+  static constexpr AlignmentConfig alignment_config(const RegistrationConfig& config) {
+    AlignmentConfig alignment = config.alignment;
+    alignment.max_side = config.grid_side;
+    return alignment;
+  }
+  template <class A>
+  static constexpr Memory carve(A& arena, const RegistrationConfig& config) {
+    const std::uint16_t side = config.matcher.side;
+    Memory m;
+    m.matcher = Matcher::carve(arena, config.matcher);
+    m.features_a = Features::carve(arena, side, FeatureUse::as_a);
+    m.features_b = Features::carve(arena, side, FeatureUse::as_b);
+    m.picture.obstacles = arena.template take<std::uint8_t>(std::size_t{side} * side, Part::spectral);
+    m.picture.side = side;
+    m.classes_a = arena.template take<std::uint8_t>(std::size_t{config.class_side} * config.class_side, Part::spectral);
+    m.classes_b = arena.template take<std::uint8_t>(std::size_t{config.class_side} * config.class_side, Part::spectral);
+    m.alignment = Alignment::carve(arena, alignment_config(config));
+    return m;
+  }
+  /// Floats of scratch that init() needs; may be shared with jobs that do not run at the same time.
+  static constexpr std::size_t scratch_size(const RegistrationConfig& config) {
+    return DigestMaker::scratch_size(config.grid_side, config.matcher.side);
+  }
+
+  Status init(const RegistrationConfig& config, const Memory& memory, Span<float> scratch);
+  Status begin(const GridView& a, const GridView& b) override;
+  bool step() override;
+  const PlaceHypotheses& hypotheses() const override { return hypotheses_; }
+
+ private:
+  enum class Stage : std::uint8_t { idle, picture_a, extract_a, picture_b, extract_b, match, classify, verify, align };
+
+  bool begin_picture(const GridView& grid, Stage stage);
+  void begin_extract(Features& out, Stage stage);
+  void verify_candidate();
+  void begin_alignment();
+  void finish_alignment();
+
+  RegistrationConfig config_;
+  Memory memory_;
+  Span<float> scratch_;
+  Matcher matcher_;
+  DigestMaker maker_;
+  Alignment alignment_;
+  Stage stage_ = Stage::idle;
+  GridView a_;
+  GridView b_;
+  ClassView class_a_;
+  ClassView class_b_;
+  std::size_t next_ = 0;
+  PlaceHypotheses candidates_;
+  PlaceHypotheses hypotheses_;
+};
+
+}  // namespace mellin

@@ -1,0 +1,190 @@
+#include "mellin/collection/linker.hpp"
+
+namespace mellin {
+
+const char* to_string(LinkReason reason) {
+  switch (reason) {
+    case LinkReason::none:
+      return "";
+    case LinkReason::weak:
+      return "weak agreement";
+    case LinkReason::waiting:
+      return "waiting for a second witness";
+    case LinkReason::contradicts_map:
+      return "contradicts the graph";
+    case LinkReason::confirmed_by_map:
+      return "confirmed by the graph";
+    case LinkReason::confirmed_by_set:
+      return "confirmed by other hypotheses";
+    case LinkReason::outlier:
+      return "rejected by the robust optimisation";
+    case LinkReason::forgotten:
+      return "dropped for lack of room";
+  }
+  return "unknown";
+}
+
+bool share_scans(const NodeScans& a, const NodeScans& b) {
+  return a.session == b.session && a.first < b.first + b.count && b.first < a.first + a.count;
+}
+
+struct Linker::Query {
+  const PoseGraph* graph;
+  Optimiser* optimiser;
+  Span<const NodeScans> scans;
+
+  static Status relative(void* context, NodeId from, NodeId to, RelativePose& out) {
+    const Query& self = *static_cast<const Query*>(context);
+    if (self.graph->component(from) != self.graph->component(to)) {
+      return Status::degenerate;
+    }
+    out.a_T_b = between(self.graph->pose(from), self.graph->pose(to));
+    if (from == to) {
+      out.covariance = Sym3{};
+      return Status::ok;
+    }
+    const Result<Sym3> covariance = self.optimiser->relative_covariance(from, to);
+    if (!covariance.ok()) {
+      return covariance.status();
+    }
+    out.covariance = covariance.value();
+    return Status::ok;
+  }
+
+  static bool shared(void* context, const LoopHypothesis& first, const LoopHypothesis& second) {
+    const Query& self = *static_cast<const Query*>(context);
+    return share_scans(self.scans[first.a], self.scans[second.a]) ||
+           share_scans(self.scans[first.b], self.scans[second.b]);
+  }
+};
+
+bool Linker::worth_keeping(const PlaceHypothesis& place) const {
+  return place.agreement >= config_.min_agreement && place.overlap >= config_.min_overlap;
+}
+
+void Linker::add(NodeId a, NodeId b, const PlaceHypothesis& place) {
+  PendingLink link;
+  link.hypothesis.a = a;
+  link.hypothesis.b = b;
+  link.hypothesis.measured.a_T_b = place.a_T_b;
+  const auto warp_m = static_cast<double>(config_.warp_sigma_m);
+  const auto warp_rad = static_cast<double>(config_.warp_sigma_rad);
+  link.hypothesis.measured.covariance =
+      place.covariance + diagonal(warp_m * warp_m, warp_m * warp_m, warp_rad * warp_rad);
+  link.agreement = place.agreement;
+  link.overlap = place.overlap;
+  link.peak = place.peak;
+  if (pending_.full()) {
+    std::size_t least = 0;
+    for (std::size_t i = 1; i < pending_.size(); ++i) {
+      least = pending_[i].agreement < pending_[least].agreement ? i : least;
+    }
+    pending_.erase(least);
+  }
+  (void)pending_.push(link);
+}
+
+bool Linker::known_well(const Sym3& covariance) const {
+  const auto m = static_cast<double>(config_.single_sigma_m);
+  const auto rad = static_cast<double>(config_.single_sigma_rad);
+  return covariance.xx <= m * m && covariance.yy <= m * m && covariance.tt <= rad * rad;
+}
+
+std::size_t Linker::decide(PoseGraph& graph, Optimiser& optimiser, Span<const NodeScans> scans, void* context,
+                           Decided decided) {
+  Query query{&graph, &optimiser, scans};
+  std::uint64_t alone = 0;     // suffice alone
+  std::uint64_t eligible = 0;  // may be in a set
+  for (std::size_t i = 0; i < pending_.size(); ++i) {
+    PendingLink& link = pending_[i];
+    const LoopHypothesis& h = link.hypothesis;
+    const std::uint64_t bit = std::uint64_t{1} << i;
+    const LinkReason before = link.reason;
+    RelativePose in_map;
+    if (graph.component(h.a) != graph.component(h.b)) {
+      link.reason = LinkReason::waiting;
+      eligible |= bit;
+    } else if (Query::relative(&query, h.a, h.b, in_map) == Status::ok) {
+      link.graph_chi2 = hypothesis_chi2(h.measured, in_map);
+      const bool fits = link.graph_chi2 <= config_.graph_gate_chi2;
+      link.reason = fits ? LinkReason::waiting : LinkReason::contradicts_map;
+      eligible |= fits ? bit : 0;
+      alone |= fits && known_well(in_map.covariance) && link.agreement >= config_.single_agreement ? bit : 0;
+    }
+    if (link.reason != before) {
+      decided(context, link, kNoId);
+    }
+  }
+  if (alone != 0) {
+    return accept(graph, alone, LinkReason::confirmed_by_map, context, decided);
+  }
+  for (std::size_t i = pending_.size(); i-- > 0;) {
+    if ((eligible >> i & 1U) == 0) {
+      continue;
+    }
+    const std::uint64_t set = confirmed(graph, query, i, eligible);
+    if (set != 0) {
+      return accept(graph, set, LinkReason::confirmed_by_set, context, decided);
+    }
+  }
+  return 0;
+}
+
+std::uint64_t Linker::confirmed(const PoseGraph& graph, Query& query, std::size_t index, std::uint64_t eligible) {
+  // All that links the same two components as the newest hypothesis does.
+  LoopHypothesis candidates[kMaxHypotheses];
+  std::size_t places[kMaxHypotheses] = {};
+  std::size_t count = 0;
+  const LoopHypothesis& seed = pending_[index].hypothesis;
+  const NodeId ca = graph.component(seed.a);
+  const NodeId cb = graph.component(seed.b);
+  for (std::size_t i = 0; i < pending_.size(); ++i) {
+    const LoopHypothesis& h = pending_[i].hypothesis;
+    const NodeId da = graph.component(h.a);
+    const NodeId db = graph.component(h.b);
+    if ((eligible >> i & 1U) != 0 && ((da == ca && db == cb) || (da == cb && db == ca))) {
+      places[count] = i;
+      candidates[count++] = h;
+    }
+  }
+  ConsistencyOptions options;
+  options.gate_chi2 = config_.pair_gate_chi2;
+  const Result<ConsistentSet> set =
+      find_consistent(Span<const LoopHypothesis>(candidates, count), {&query, Query::relative, Query::shared}, options);
+  const std::uint32_t needed = ca == cb ? config_.loop_witnesses : config_.merge_witnesses;
+  if (!set.ok() || set.value().witness_count < needed) {
+    return 0;
+  }
+  std::uint64_t members = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    members |= (set.value().members >> i & 1U) != 0 ? std::uint64_t{1} << places[i] : 0;
+  }
+  return members;
+}
+
+std::size_t Linker::accept(PoseGraph& graph, std::uint64_t members, LinkReason reason, void* context, Decided decided) {
+  std::size_t added = 0;
+  for (std::size_t i = pending_.size(); i-- > 0;) {
+    if ((members >> i & 1U) == 0) {
+      continue;
+    }
+    PendingLink link = pending_[i];
+    const LoopHypothesis& h = link.hypothesis;
+    Sym3 information;
+    if (information_from_covariance(h.measured.a_T_b, h.measured.covariance, information)) {
+      const EdgeKind kind = graph.component(h.a) == graph.component(h.b) ? EdgeKind::loop : EdgeKind::merge;
+      const Result<EdgeId> edge = graph.add_edge(h.a, h.b, kind, h.measured.a_T_b,
+                                                 scale(information, static_cast<double>(config_.information_share)));
+      if (!edge.ok()) {
+        continue;  // the graph is full: the hypothesis keeps waiting
+      }
+      link.reason = reason;
+      decided(context, link, edge.value());
+      ++added;
+    }
+    pending_.erase(i);
+  }
+  return added;
+}
+
+}  // namespace mellin

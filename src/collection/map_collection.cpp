@@ -1,0 +1,402 @@
+#include "mellin/collection/map_collection.hpp"
+
+#include "mellin/collection/persistence.hpp"
+
+namespace mellin {
+
+// Restoring, storing and flushing are in map_storage.cpp.
+
+Status MapCollection::init(const CollectionConfig& config, const Memory& memory, DigestMatcher& digests,
+                           GridMatcher& grids, SubmapStore& store, const mellin_clock& clock, Log log) {
+  config_ = config;
+  memory_ = memory;
+  digests_ = &digests;
+  grids_ = &grids;
+  store_ = &store;
+  clock_ = clock;
+  log_ = log;
+  linker_ = Linker(config.linker, memory.linker);
+  candidates_ = List<Candidate>(memory.candidates);
+  const PoseGraphConfig graph = graph_config(config);
+  const Status status = graph_.init(graph, memory.graph);
+  if (status != Status::ok) {
+    return status;
+  }
+  stage_ = store.submap_count() > 0 ? Stage::restore_submaps : Stage::idle;
+  return optimiser_.init(graph, memory.optimiser);
+}
+
+Status MapCollection::begin_session(const SessionId& id) {
+  if (session_count_ >= memory_.sessions.size()) {
+    return Status::full;
+  }
+  session_ = session_count_++;
+  memory_.sessions[session_] = id;
+  newest_ = kNoSubmap;
+  return Status::ok;
+}
+
+Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot) {
+  if (!ready() || session_count_ == 0) {
+    return Status::busy;
+  }
+  if (count_ >= config_.max_submaps) {
+    return Status::full;
+  }
+  const SubmapId id = count_;
+  header.id = id;
+  header.session = memory_.sessions[session_];
+  const Result<NodeId> node = graph_.add_node(header.session_T_submap);
+  if (!node.ok()) {
+    return node.status();
+  }
+  ++count_;
+  memory_.headers[id] = header;
+  memory_.scans[id] = {session_, header.first_scan, header.scan_count};
+  slot_ = static_cast<SlotHandle&&>(slot);
+  (void)store_->slots().assign(slot_, id);
+  link_odometry(id);
+  newest_ = id;
+  const bool described = digests_->begin_describe(id, store_->slots().view(slot_)) == Status::ok;
+  stage_ = described ? Stage::describe : Stage::store_submap;
+  return id;
+}
+
+void MapCollection::link_odometry(SubmapId id) {
+  odometry_edge_ = kNoId;
+  if (newest_ == kNoSubmap) {
+    return;
+  }
+  const Pose2 step = between(memory_.headers[newest_].session_T_submap, memory_.headers[id].session_T_submap);
+  const OdometryEdgeNoise& noise = config_.odometry;
+  const double distance = translation(step);
+  const double m = static_cast<double>(noise.base_m) + static_cast<double>(noise.per_m) * distance;
+  const double rad = static_cast<double>(noise.base_rad) + static_cast<double>(noise.per_m_rad) * distance;
+  const Result<EdgeId> edge =
+      graph_.add_edge(newest_, id, EdgeKind::odometry, step, diagonal(1.0 / (m * m), 1.0 / (m * m), 1.0 / (rad * rad)));
+  if (edge.ok()) {
+    odometry_edge_ = edge.value();
+  } else {
+    log_.write(MELLIN_LOG_WARNING, LogLine() << "submap " << id << ": no odometry edge: " << to_string(edge.status()));
+  }
+}
+
+std::uint64_t* MapCollection::stage_clock() {
+  switch (stage_) {
+    case Stage::describe:
+    case Stage::screen:
+    case Stage::screening:
+      return &statistics_.screening_us;
+    case Stage::choose:
+    case Stage::registering:
+      return &statistics_.registration_us;
+    case Stage::marginals:
+    case Stage::judge:
+    case Stage::optimise:
+      return &statistics_.optimisation_us;
+    default:
+      return &statistics_.store_us;
+  }
+}
+
+void MapCollection::step() {
+  if (stage_ == Stage::idle) {
+    return;
+  }
+  std::uint64_t* const spent = stage_clock();
+  const std::uint64_t before = clock_.now_us != nullptr ? clock_.now_us(clock_.context) : 0;
+  run_slice();
+  *spent += clock_.now_us != nullptr ? clock_.now_us(clock_.context) - before : 0;
+}
+
+void MapCollection::run_slice() {
+  switch (stage_) {
+    case Stage::idle:
+      break;
+    case Stage::restore_submaps:
+      restore_submap();
+      break;
+    case Stage::restore_digest:
+      if (digests_->step()) {
+        stage_ = Stage::restore_submaps;
+      }
+      break;
+    case Stage::restore_edges:
+      restore_edge();
+      break;
+    case Stage::restore_poses:
+      restore_pose();
+      break;
+    case Stage::describe:
+      if (digests_->step()) {
+        begin_storing();
+      }
+      break;
+    case Stage::store_submap:
+    case Stage::store_digest:
+    case Stage::store_node:
+    case Stage::store_edge:
+    case Stage::commit:
+      step_store();
+      break;
+    case Stage::screen:
+      screen_next();
+      break;
+    case Stage::screening:
+      if (digests_->step()) {
+        finish_screening();
+      }
+      break;
+    case Stage::choose:
+      choose_candidate();
+      break;
+    case Stage::fetching:
+      step_fetch();
+      break;
+    case Stage::registering:
+      if (grids_->step()) {
+        finish_registration();
+      }
+      break;
+    case Stage::marginals:
+      if (!optimiser_.step()) {
+        stage_ = Stage::judge;
+      }
+      break;
+    case Stage::judge:
+      judge();
+      break;
+    case Stage::optimise:
+      if (!optimiser_.step()) {
+        finish_optimisation();
+      }
+      break;
+    case Stage::flush:
+      step_flush();
+      break;
+  }
+}
+
+void MapCollection::begin_screening() {
+  other_ = 0;
+  registered_ = 0;
+  evidence_ = false;
+  candidates_.clear();
+  stage_ = config_.close_loops ? Stage::screen : Stage::idle;
+  if (stage_ == Stage::idle) {
+    finish_submap();
+  }
+}
+
+void MapCollection::screen_next() {
+  const SubmapId newest = count_ - 1;
+  while (other_ < newest && share_scans(memory_.scans[other_], memory_.scans[newest])) {
+    ++other_;
+  }
+  if (other_ >= newest) {
+    stage_ = Stage::choose;
+    return;
+  }
+  ++statistics_.pairs_possible;
+  if (digests_->begin_compare(other_, newest) == Status::ok) {
+    stage_ = Stage::screening;
+  } else {
+    ++other_;
+  }
+}
+
+void MapCollection::finish_screening() {
+  ++statistics_.pairs_screened;
+  const SubmapId newest = count_ - 1;
+  const PlaceHypotheses& found = digests_->hypotheses();
+  PairEvent event;
+  event.stage = PairEvent::Stage::screened;
+  event.a = other_;
+  event.b = newest;
+  if (!found.empty()) {
+    event.score = found[0].peak;
+    event.agreement = found[0].agreement;
+    event.a_T_b = found[0].a_T_b;
+    event.accepted = found[0].agreement >= config_.candidate_agreement;
+  }
+  event.reason = event.accepted ? LinkReason::none : LinkReason::weak;
+  report(event);
+  if (event.accepted) {
+    (void)candidates_.push({other_, event.agreement});
+  }
+  ++other_;
+  stage_ = Stage::screen;
+}
+
+void MapCollection::choose_candidate() {
+  std::size_t best = candidates_.size();
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    if (best == candidates_.size() || candidates_[i].score > candidates_[best].score) {
+      best = i;
+    }
+  }
+  if (best == candidates_.size() || registered_ >= config_.candidates) {
+    if (evidence_) {
+      begin_marginals();
+    } else {
+      finish_submap();
+    }
+    return;
+  }
+  other_ = candidates_[best].id;
+  // Neighbours of the chosen one rest on the same scans: they would say the same again.
+  for (std::size_t i = candidates_.size(); i-- > 0;) {
+    if (share_scans(memory_.scans[candidates_[i].id], memory_.scans[other_])) {
+      candidates_.erase(i);
+    }
+  }
+  ++registered_;
+  if (store_->is_resident(other_)) {
+    begin_registration();
+    return;
+  }
+  const Status status = store_->begin_fetch(other_);
+  if (status == Status::ok) {
+    stage_ = Stage::fetching;
+  } else {
+    ++statistics_.fetches_failed;
+  }
+}
+
+void MapCollection::step_fetch() {
+  const Status status = store_->step_fetch();
+  if (status == Status::busy) {
+    return;
+  }
+  if (status == Status::ok) {
+    begin_registration();
+    return;
+  }
+  log_.write(MELLIN_LOG_WARNING, LogLine() << "submap " << other_ << " cannot be fetched: " << to_string(status));
+  ++statistics_.fetches_failed;
+  stage_ = Stage::choose;
+}
+
+void MapCollection::begin_registration() {
+  stage_ = Stage::choose;
+  Result<SlotHandle> slot = store_->slot(other_);
+  if (!slot.ok()) {
+    ++statistics_.fetches_failed;
+    return;
+  }
+  other_slot_ = static_cast<SlotHandle&&>(slot.value());
+  const GridSlots& slots = store_->slots();
+  if (grids_->begin(slots.view(other_slot_), slots.view(slot_)) == Status::ok) {
+    stage_ = Stage::registering;
+  } else {
+    (void)store_->slots().release(other_slot_);
+  }
+}
+
+void MapCollection::finish_registration() {
+  ++statistics_.pairs_registered;
+  (void)store_->slots().release(other_slot_);
+  const SubmapId newest = count_ - 1;
+  PairEvent event;
+  event.stage = PairEvent::Stage::registered;
+  event.a = other_;
+  event.b = newest;
+  event.reason = LinkReason::weak;
+  if (grids_->hypotheses().empty()) {
+    report(event);
+  }
+  for (const PlaceHypothesis& place : grids_->hypotheses()) {
+    event.score = place.peak;
+    event.agreement = place.agreement;
+    event.a_T_b = place.a_T_b;
+    event.accepted = linker_.worth_keeping(place);
+    event.reason = event.accepted ? LinkReason::none : LinkReason::weak;
+    report(event);
+    if (event.accepted) {
+      linker_.add(other_, newest, place);
+      evidence_ = true;
+    }
+  }
+  stage_ = Stage::choose;
+}
+
+void MapCollection::begin_marginals() {
+  OptimiserOptions options;
+  options.max_iterations = 0;
+  options.marginals = true;
+  stage_ = optimiser_.begin(graph_, options) == Status::ok ? Stage::marginals : Stage::idle;
+  if (stage_ == Stage::idle) {
+    finish_submap();
+  }
+}
+
+void MapCollection::judge() {
+  const auto decided = [](void* context, const PendingLink& link, EdgeId edge) {
+    MapCollection& self = *static_cast<MapCollection*>(context);
+    PairEvent event;
+    event.stage = PairEvent::Stage::decided;
+    event.a = link.hypothesis.a;
+    event.b = link.hypothesis.b;
+    event.score = link.peak;
+    event.agreement = link.agreement;
+    event.a_T_b = link.hypothesis.measured.a_T_b;
+    event.accepted = edge != kNoId;
+    event.reason = link.reason;
+    self.report(event);
+  };
+  const std::size_t added = linker_.decide(graph_, optimiser_, memory_.scans.first(count_), this, decided);
+  statistics_.pairs_accepted += added;
+  if (added == 0) {
+    finish_submap();
+    return;
+  }
+  OptimiserOptions options;
+  options.robust = true;
+  options.marginals = true;
+  ++statistics_.optimisations;
+  stage_ = optimiser_.begin(graph_, options) == Status::ok ? Stage::optimise : Stage::idle;
+  if (stage_ == Stage::idle) {
+    finish_submap();
+  }
+}
+
+void MapCollection::finish_optimisation() {
+  // What the robust kernel has rejected leaves the graph, in the open.
+  bool changed = false;
+  for (EdgeId id = 0; id < graph_.edge_count(); ++id) {
+    const Edge& edge = graph_.edge(id);
+    if (!edge.enabled || edge.kind == EdgeKind::odometry || edge.weight >= 0.5) {
+      continue;
+    }
+    PairEvent event;
+    event.stage = PairEvent::Stage::decided;
+    event.a = edge.a;
+    event.b = edge.b;
+    event.a_T_b = edge.a_T_b;
+    event.reason = LinkReason::outlier;
+    report(event);
+    ++statistics_.edges_rejected;
+    --statistics_.pairs_accepted;
+    (void)graph_.disable_edge(id);
+    changed = true;
+  }
+  if (changed) {
+    begin_marginals();  // the factor is of the graph as it was
+  } else {
+    stage_ = Stage::judge;  // what waited may fit now
+  }
+}
+
+void MapCollection::finish_submap() {
+  (void)store_->slots().release(slot_);
+  stage_ = Stage::idle;
+}
+
+void MapCollection::report(PairEvent event) const {
+  if (observer_.seen != nullptr) {
+    event.between_sessions = session_of(event.a) != session_of(event.b);
+    observer_.seen(observer_.context, event);
+  }
+}
+
+}  // namespace mellin

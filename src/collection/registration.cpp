@@ -1,0 +1,159 @@
+#include "mellin/collection/registration.hpp"
+
+#include "mellin/collection/screening.hpp"
+
+namespace mellin {
+namespace {
+
+constexpr std::size_t kLinesPerStep = 32;
+
+/// Alignment that moved a hypothesis farther than this has found something else.
+constexpr double kSameDistance_m = 0.3;
+constexpr double kSameAngle_rad = 0.05;
+
+bool same_place(const Pose2& p, const Pose2& q) {
+  const Pose2 off = between(p, q);
+  return translation(off) < kSameDistance_m && off.theta < kSameAngle_rad && off.theta > -kSameAngle_rad;
+}
+
+}  // namespace
+
+Status SpectralRegistration::init(const RegistrationConfig& config, const Memory& memory, Span<float> scratch) {
+  config_ = config;
+  memory_ = memory;
+  scratch_ = scratch;
+  if (config.aligned < 1 || config.aligned > kMaxPlaceHypotheses || config.class_side == 0 ||
+      config.grid_side % config.class_side != 0) {
+    return Status::invalid_config;
+  }
+  if (scratch.size() < scratch_size(config)) {
+    return Status::insufficient_memory;
+  }
+  const Status matcher = matcher_.init(config.matcher, memory.matcher);
+  return matcher != Status::ok ? matcher : alignment_.init(alignment_config(config), memory.alignment);
+}
+
+Status SpectralRegistration::begin(const GridView& a, const GridView& b) {
+  hypotheses_.clear();
+  candidates_.clear();
+  a_ = a;
+  b_ = b;
+  if (a.side != config_.grid_side || b.side != config_.grid_side) {
+    return Status::invalid_argument;
+  }
+  return begin_picture(a, Stage::picture_a) ? Status::ok : Status::invalid_argument;
+}
+
+bool SpectralRegistration::begin_picture(const GridView& grid, Stage stage) {
+  stage_ = maker_.begin(grid, scratch_, memory_.picture) == Status::ok ? stage : Stage::idle;
+  return stage_ != Stage::idle;
+}
+
+void SpectralRegistration::begin_extract(Features& out, Stage stage) {
+  stage_ = matcher_.begin_extract(memory_.picture.obstacles, out) == Status::ok ? stage : Stage::idle;
+}
+
+bool SpectralRegistration::step() {
+  switch (stage_) {
+    case Stage::idle:
+      return true;
+    case Stage::picture_a:
+      if (maker_.step(kLinesPerStep)) {
+        begin_extract(memory_.features_a, Stage::extract_a);
+      }
+      break;
+    case Stage::extract_a:
+      if (matcher_.step()) {
+        (void)begin_picture(b_, Stage::picture_b);
+      }
+      break;
+    case Stage::picture_b:
+      if (maker_.step(kLinesPerStep)) {
+        begin_extract(memory_.features_b, Stage::extract_b);
+      }
+      break;
+    case Stage::extract_b:
+      if (matcher_.step()) {
+        stage_ =
+            matcher_.begin_match(memory_.features_a, memory_.features_b) == Status::ok ? Stage::match : Stage::idle;
+      }
+      break;
+    case Stage::match:
+      if (matcher_.step()) {
+        stage_ = matcher_.hypotheses().empty() ? Stage::idle : Stage::classify;
+      }
+      break;
+    case Stage::classify: {
+      const Result<ClassView> a = classify(a_, config_.verification, config_.class_side, memory_.classes_a);
+      const Result<ClassView> b = classify(b_, config_.verification, config_.class_side, memory_.classes_b);
+      next_ = 0;
+      stage_ = a.ok() && b.ok() ? Stage::verify : Stage::idle;
+      if (stage_ == Stage::verify) {
+        class_a_ = a.value();
+        class_b_ = b.value();
+      }
+      break;
+    }
+    case Stage::verify:
+      verify_candidate();
+      break;
+    case Stage::align:
+      if (!alignment_.step()) {
+        finish_alignment();
+      }
+      break;
+  }
+  return stage_ == Stage::idle;
+}
+
+void SpectralRegistration::verify_candidate() {
+  const Hypothesis& h = matcher_.hypotheses()[next_];
+  const Result<Agreement> agreement = verify(class_a_, class_b_, h.a_T_b, config_.verification);
+  if (agreement.ok()) {
+    PlaceHypothesis candidate;
+    candidate.a_T_b = h.a_T_b;
+    candidate.peak = h.peak;
+    candidate.agreement = agreement.value().score;
+    candidate.overlap = agreement.value().overlap;
+    insert_by_agreement(candidates_, candidate);
+  }
+  ++next_;
+  if (next_ >= matcher_.hypotheses().size()) {
+    next_ = 0;
+    begin_alignment();
+  }
+}
+
+void SpectralRegistration::begin_alignment() {
+  stage_ = Stage::idle;
+  if (next_ < candidates_.size() && next_ < config_.aligned &&
+      alignment_.begin(a_, b_, candidates_[next_].a_T_b) == Status::ok) {
+    stage_ = Stage::align;
+  }
+}
+
+void SpectralRegistration::finish_alignment() {
+  PlaceHypothesis candidate = candidates_[next_];
+  ++next_;
+  const Result<AlignmentResult> aligned = alignment_.result();
+  if (aligned.ok()) {
+    const AlignmentResult& r = aligned.value();
+    bool known = false;
+    for (const PlaceHypothesis& other : hypotheses_) {
+      known |= same_place(other.a_T_b, r.a_T_b);
+    }
+    const Result<Agreement> agreement = verify(class_a_, class_b_, r.a_T_b, config_.verification);
+    Sym3 in_b;
+    if (!known && agreement.ok() && invert(r.information + diagonal(1e-6, 1e-6, 1e-6), in_b)) {
+      candidate.a_T_b = r.a_T_b;
+      candidate.covariance = rotate(in_b, r.a_T_b.theta);
+      candidate.agreement = agreement.value().score;
+      candidate.overlap = agreement.value().overlap;
+      candidate.inlier_share = r.inlier_share;
+      insert_by_agreement(hypotheses_, candidate);
+    }
+  }
+  begin_alignment();
+}
+
+}  // namespace mellin
