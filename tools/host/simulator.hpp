@@ -13,7 +13,6 @@
 #include <string>
 #include <vector>
 
-#include "mellin/core/random.hpp"
 #include "mellin/core/se2.hpp"
 
 namespace mellin::host {
