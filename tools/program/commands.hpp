@@ -4,4 +4,9 @@
 
 #include <CLI/CLI.hpp>
 
-namespace mellin::program {}  // namespace mellin::program
+namespace mellin::program {
+
+void add_sim(CLI::App& app);    ///< mellin sim
+void add_score(CLI::App& app);  ///< mellin score
+
+}  // namespace mellin::program

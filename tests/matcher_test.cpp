@@ -1,0 +1,503 @@
+#include "mellin/spectral/matcher.hpp"
+
+#include <doctest.h>
+
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <initializer_list>
+#include <utility>
+#include <vector>
+
+#include "mellin/core/random.hpp"
+#include "mellin/grid/digest.hpp"
+#include "tests/golden/spectral.hpp"
+
+using namespace mellin;
+
+namespace {
+
+using Picture = std::vector<std::uint8_t>;
+
+/// A matcher with memory for itself and as many features as are asked for.
+class Bench {
+ public:
+  explicit Bench(const MatcherConfig& config) : config_(config) {
+    MeasureArena measure;
+    Matcher::carve(measure, config);
+    memory_.resize(measure.use().total() / sizeof(double));
+    Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(memory_.data()), measure.use().total()));
+    REQUIRE(matcher.init(config, Matcher::carve(arena, config)) == Status::ok);
+    REQUIRE(arena.ok());
+    REQUIRE(arena.use().total() == measure.use().total());
+  }
+
+  /// Features over memory that lives as long as the bench.
+  Features carve(FeatureUse use = FeatureUse::both) {
+    MeasureArena measure;
+    Features::carve(measure, config_.side, use);
+    feature_memory_.emplace_back(measure.use().total() / sizeof(double));
+    std::vector<double>& memory = feature_memory_.back();
+    Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(memory.data()), measure.use().total()));
+    return Features::carve(arena, config_.side, use);
+  }
+  Features extract(const Picture& picture, FeatureUse use = FeatureUse::both) {
+    Features features = carve(use);
+    REQUIRE(matcher.extract({picture.data(), picture.size()}, features) == Status::ok);
+    return features;
+  }
+  HypothesisList match(const Picture& a, const Picture& b) {
+    REQUIRE(matcher.match(extract(a), extract(b)) == Status::ok);
+    return matcher.hypotheses();
+  }
+
+  Matcher matcher;
+
+ private:
+  MatcherConfig config_;
+  std::vector<double> memory_;
+  std::vector<std::vector<double>> feature_memory_;
+};
+
+MatcherConfig config_of(std::uint16_t side, float pixel_m = 1.0F) {
+  MatcherConfig config;
+  config.side = side;
+  config.pixel_m = pixel_m;
+  return config;
+}
+
+struct Wall {
+  double x0, y0, x1, y1;
+};
+
+/// A floor of an office building round the origin: two corridors, rooms of different sizes with doors, furniture.
+std::vector<Wall> office(std::uint64_t seed) {
+  Random random(seed, 1);
+  std::vector<Wall> walls;
+  for (const double corridor : {-1.0, 1.0}) {
+    for (double x = -24.0; x < 24.0;) {
+      const double width = 2.5 + 3.5 * random.uniform();
+      const double depth = corridor * (3.5 + 2.5 * random.uniform());
+      const double door = x + 0.3 + (width - 1.5) * random.uniform();
+      walls.push_back({x, corridor, door, corridor});
+      walls.push_back({door + 0.9, corridor, x + width, corridor});
+      walls.push_back({x, corridor, x, corridor + depth});
+      walls.push_back({x, corridor + depth, x + width, corridor + depth});
+      for (int i = 0; i < 2; ++i) {
+        const double fx = x + 0.4 + (width - 1.4) * random.uniform();
+        const double fy = corridor + depth * (0.2 + 0.6 * random.uniform());
+        walls.push_back({fx, fy, fx + 0.6 * random.uniform(), fy + 0.8 * (random.uniform() - 0.5)});
+      }
+      x += width;
+    }
+  }
+  for (const double x : {-7.0, -5.2}) {
+    walls.push_back({x, -14.0, x, -1.0});
+    walls.push_back({x, 5.0, x, 14.0 + x / 7.0});
+  }
+  return walls;
+}
+
+/// The submap at `world_T_submap`: what lies within `range_m` of it, drawn from the walls themselves, so that two
+/// submaps of the same walls are two samplings, not one picture turned.
+std::vector<std::uint8_t> render(const std::vector<Wall>& walls, const Pose2& world_T_submap, std::uint16_t side,
+                                 double cell_m, double range_m) {
+  std::vector<std::uint8_t> cells(std::size_t{side} * side, kUnobserved);
+  const double half = side / 2.0;
+  for (std::size_t r = 0; r < side; ++r) {
+    for (std::size_t c = 0; c < side; ++c) {
+      const double x = (static_cast<double>(c) + 0.5 - half) * cell_m;
+      const double y = (static_cast<double>(r) + 0.5 - half) * cell_m;
+      if (x * x + y * y < range_m * range_m) {
+        cells[r * side + c] = 0;
+      }
+    }
+  }
+  const Pose2 submap_T_world = inverse(world_T_submap);
+  for (const Wall& wall : walls) {
+    const double length = std::hypot(wall.x1 - wall.x0, wall.y1 - wall.y0);
+    const int points = static_cast<int>(length / cell_m * 4.0) + 2;
+    for (int i = 0; i < points; ++i) {
+      const double t = i / (points - 1.0);
+      const Pose2 p =
+          compose(submap_T_world, {wall.x0 + t * (wall.x1 - wall.x0), wall.y0 + t * (wall.y1 - wall.y0), 0});
+      const double c = std::floor(p.x / cell_m + half);
+      const double r = std::floor(p.y / cell_m + half);
+      if (p.x * p.x + p.y * p.y < range_m * range_m && c >= 0 && c < side && r >= 0 && r < side) {
+        cells[static_cast<std::size_t>(r) * side + static_cast<std::size_t>(c)] = kCertainlyOccupied;
+      }
+    }
+  }
+  return cells;
+}
+
+Picture digest_of(const std::vector<std::uint8_t>& cells, std::uint16_t grid_side, std::uint16_t side) {
+  Picture picture(std::size_t{side} * side);
+  std::vector<float> scratch(DigestMaker::scratch_size(grid_side, side));
+  DigestOut out;
+  out.obstacles = {picture.data(), picture.size()};
+  out.side = side;
+  REQUIRE(make_digest({{cells.data(), cells.size()}, grid_side, 0.1F}, {scratch.data(), scratch.size()}, out) ==
+          Status::ok);
+  return picture;
+}
+
+struct Error {
+  double metres;
+  double radians;
+};
+
+Error error_of(const Pose2& pose, const Pose2& truth) {
+  return {std::hypot(pose.x - truth.x, pose.y - truth.y), std::fabs(wrap_angle(pose.theta - truth.theta))};
+}
+
+Picture golden_picture(const std::uint8_t (&bytes)[48 * 48]) { return {bytes, bytes + 48 * 48}; }
+
+/// `picture` moved by whole pixels; what leaves the frame is lost.
+Picture moved(const Picture& picture, std::size_t side, int dx, int dy) {
+  Picture out(picture.size(), 0);
+  const int n = static_cast<int>(side);
+  for (int r = 0; r < n; ++r) {
+    for (int c = 0; c < n; ++c) {
+      if (c - dx >= 0 && c - dx < n && r - dy >= 0 && r - dy < n) {
+        out[static_cast<std::size_t>(r * n + c)] = picture[static_cast<std::size_t>((r - dy) * n + c - dx)];
+      }
+    }
+  }
+  return out;
+}
+
+/// `picture` turned by 90 degrees from x to y, exactly.
+Picture quarter_turned(const Picture& picture, std::size_t side) {
+  Picture out(picture.size());
+  for (std::size_t r = 0; r < side; ++r) {
+    for (std::size_t c = 0; c < side; ++c) {
+      out[c * side + (side - 1 - r)] = picture[r * side + c];
+    }
+  }
+  return out;
+}
+
+/// A small picture in the middle of a larger one.
+Picture centred(const Picture& picture, std::size_t side, std::size_t in) {
+  Picture out(in * in, 0);
+  const std::size_t border = (in - side) / 2;
+  for (std::size_t r = 0; r < side; ++r) {
+    for (std::size_t c = 0; c < side; ++c) {
+      out[(r + border) * in + c + border] = picture[r * side + c];
+    }
+  }
+  return out;
+}
+
+bool all_finite(const HypothesisList& hypotheses) {
+  for (const Hypothesis& h : hypotheses) {
+    if (!is_finite(h.a_T_b) || !std::isfinite(h.peak) || !std::isfinite(h.rotation_peak)) {
+      return false;
+    }
+  }
+  return true;
+}
+
+bool same_bits(const HypothesisList& a, const HypothesisList& b) {
+  if (a.size() != b.size()) {
+    return false;
+  }
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (std::memcmp(&a[i].a_T_b, &b[i].a_T_b, sizeof(Pose2)) != 0 || a[i].peak != b[i].peak ||
+        a[i].rotation_peak != b[i].rotation_peak) {
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+
+TEST_SUITE("matcher") {
+  TEST_CASE("hypotheses equal those of a numpy implementation in double precision") {
+    Bench bench(config_of(48));
+    const HypothesisList found = bench.match(golden_picture(golden::kPictureA), golden_picture(golden::kPictureB));
+    REQUIRE(found.size() == std::size(golden::kHypotheses));
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const double(&expected)[5] = golden::kHypotheses[i];
+      CHECK(found[i].a_T_b.x == doctest::Approx(expected[0]).epsilon(1e-3));
+      CHECK(found[i].a_T_b.y == doctest::Approx(expected[1]).epsilon(1e-3));
+      CHECK(found[i].a_T_b.theta == doctest::Approx(expected[2]).epsilon(1e-4));
+      CHECK(found[i].peak == doctest::Approx(expected[3]).epsilon(1e-3));
+      CHECK(found[i].rotation_peak == doctest::Approx(expected[4]).epsilon(1e-4));
+    }
+  }
+
+  TEST_CASE("a picture against itself: no motion, peaks near 1") {
+    for (const std::uint16_t side : std::initializer_list<std::uint16_t>{48, 50, 54}) {
+      Bench bench(config_of(side));
+      const Picture picture = centred(golden_picture(golden::kPictureA), 48, side);
+      const HypothesisList found = bench.match(picture, picture);
+      CHECK(std::hypot(found[0].a_T_b.x, found[0].a_T_b.y) < 1e-3);
+      CHECK(std::fabs(found[0].a_T_b.theta) < 1e-4);
+      CHECK(found[0].rotation_peak == doctest::Approx(1.0).epsilon(1e-4));
+      CHECK(found[0].peak > 0.95F);
+      CHECK(found[0].peak < 1.001F);
+    }
+  }
+
+  TEST_CASE("whole pixels of motion come back as such, in metres") {
+    Bench bench(config_of(96, 0.4F));
+    const Picture still = centred(golden_picture(golden::kPictureA), 48, 96);
+    for (const auto& [dx, dy] : {std::pair{5, 0}, {0, -7}, {-20, 11}, {23, 23}, {-24, -24}}) {
+      const HypothesisList found = bench.match(moved(still, 96, dx, dy), still);
+      CHECK(error_of(found[0].a_T_b, {0.4 * dx, 0.4 * dy, 0.0}).metres < 0.01 * 0.4);
+      CHECK(error_of(found[0].a_T_b, {0.4 * dx, 0.4 * dy, 0.0}).radians < 1e-3);
+    }
+  }
+
+  TEST_CASE("exact quarter turns about the grid's centre have no translation, at even sides of any kind") {
+    for (const std::uint16_t side : std::initializer_list<std::uint16_t>{60, 64, 90}) {
+      CAPTURE(side);
+      Bench bench(config_of(side));
+      const Picture still = centred(golden_picture(golden::kPictureA), 48, side);
+      Picture turned = still;
+      for (int quarter = 1; quarter < 4; ++quarter) {
+        CAPTURE(quarter);
+        turned = quarter_turned(turned, side);
+        const HypothesisList found = bench.match(turned, still);
+        CHECK(std::hypot(found[0].a_T_b.x, found[0].a_T_b.y) < 0.02);
+        CHECK(std::fabs(wrap_angle(found[0].a_T_b.theta - quarter * kHalfPi)) < 2e-3);
+        CHECK(found[0].peak > 0.9F);
+      }
+    }
+  }
+
+  TEST_CASE("offices rendered at two poses are registered over the full circle to less than a pixel and a bin") {
+    const std::uint16_t grid = 384;
+    const std::uint16_t side = 96;
+    const double pixel = 0.4;
+    Bench bench(config_of(side, static_cast<float>(pixel)));
+    Random random(11, 0);
+    for (int i = 0; i < 36; ++i) {
+      CAPTURE(i);
+      const std::vector<Wall> walls = office(static_cast<std::uint64_t>(i) / 6);
+      const Pose2 w_T_a{4.0 * random.uniform() - 2.0, 3.0 * random.uniform() - 1.5, kTwoPi * random.uniform()};
+      const Pose2 a_T_b{8.0 * random.uniform() - 4.0, 8.0 * random.uniform() - 4.0,
+                        wrap_angle((i * 10.0 + 10.0 * random.uniform()) * kPi / 180.0)};
+      const Picture a = digest_of(render(walls, w_T_a, grid, 0.1, 17.0), grid, side);
+      const Picture b = digest_of(render(walls, compose(w_T_a, a_T_b), grid, 0.1, 17.0), grid, side);
+      const HypothesisList found = bench.match(a, b);
+      REQUIRE_FALSE(found.empty());
+      CHECK(error_of(found[0].a_T_b, a_T_b).metres < pixel);
+      CHECK(error_of(found[0].a_T_b, a_T_b).radians < kPi / side);
+
+      const HypothesisList swapped = bench.match(b, a);
+      REQUIRE_FALSE(swapped.empty());
+      const Error disagreement = error_of(inverse(swapped[0].a_T_b), found[0].a_T_b);
+      CHECK(disagreement.metres < pixel);
+      CHECK(disagreement.radians < kPi / side);
+    }
+  }
+
+  TEST_CASE("at the grid's own resolution the error is of the order of a cell") {
+    const std::uint16_t side = 384;
+    const double pixel = 0.1;
+    Bench bench(config_of(side, static_cast<float>(pixel)));
+    Random random(12, 0);
+    for (int i = 0; i < 6; ++i) {
+      CAPTURE(i);
+      const std::vector<Wall> walls = office(static_cast<std::uint64_t>(i));
+      const Pose2 a_T_b{6.0 * random.uniform() - 3.0, 6.0 * random.uniform() - 3.0, wrap_angle(i + random.uniform())};
+      const Picture a = digest_of(render(walls, {}, side, pixel, 17.0), side, side);
+      const Picture b = digest_of(render(walls, a_T_b, side, pixel, 17.0), side, side);
+      const HypothesisList found = bench.match(a, b);
+      REQUIRE_FALSE(found.empty());
+      CHECK(error_of(found[0].a_T_b, a_T_b).metres < 1.5 * pixel);
+      CHECK(error_of(found[0].a_T_b, a_T_b).radians < kPi / side);
+    }
+  }
+
+  TEST_CASE("unrelated offices have much lower peaks than the same one") {
+    Bench bench(config_of(96, 0.4F));
+    const auto picture = [](std::uint64_t seed, const Pose2& pose) {
+      return digest_of(render(office(seed), pose, 384, 0.1, 17.0), 384, 96);
+    };
+    const float same = bench.match(picture(1, {}), picture(1, {2.0, 1.0, 0.7}))[0].peak;
+    for (std::uint64_t seed = 2; seed < 8; ++seed) {
+      CHECK(bench.match(picture(1, {}), picture(seed, {2.0, 1.0, 0.7}))[0].peak < 0.5F * same);
+    }
+  }
+
+  TEST_CASE("steps of any size, and features kept for one role only, give the same bits") {
+    const Picture a = centred(golden_picture(golden::kPictureA), 48, 50);
+    const Picture b = centred(golden_picture(golden::kPictureB), 48, 50);
+    Bench whole(config_of(50));
+    const HypothesisList expected = whole.match(a, b);
+    REQUIRE_FALSE(expected.empty());
+    for (const std::uint16_t lines : std::initializer_list<std::uint16_t>{1, 3, 8, 13, 1000}) {
+      MatcherConfig config = config_of(50);
+      config.lines_per_step = lines;
+      Bench sliced(config);
+      CHECK(same_bits(sliced.match(a, b), expected));
+    }
+    const Features as_a = whole.extract(a, FeatureUse::as_a);
+    const Features as_b = whole.extract(b, FeatureUse::as_b);
+    CHECK(as_a.image.empty());
+    CHECK(as_b.filter.empty());
+    REQUIRE(whole.matcher.match(as_a, as_b) == Status::ok);
+    CHECK(same_bits(whole.matcher.hypotheses(), expected));
+  }
+
+  TEST_CASE("a step is as short as configured, and a job ends once") {
+    MatcherConfig config = config_of(48);
+    config.lines_per_step = 8;
+    Bench bench(config);
+    const Picture picture = golden_picture(golden::kPictureA);
+    CHECK(bench.matcher.step());
+    Features features = bench.carve();
+    REQUIRE(bench.matcher.begin_extract({picture.data(), picture.size()}, features) == Status::ok);
+    int steps = 1;
+    while (!bench.matcher.step()) {
+      CHECK_FALSE(features.ready);
+      ++steps;
+    }
+    // Load 6, edges (4 margins of 2 and 48 rows) 7, rows 6, columns 25 / 8 = 4, whitening 4, rings 3, scaling 3.
+    CHECK(steps == 33);
+    CHECK(features.ready);
+    CHECK(bench.matcher.step());
+  }
+
+  TEST_CASE("fewer peaks and a threshold on rotations give a prefix of the work") {
+    Bench bench(config_of(48));
+    const Features a = bench.extract(golden_picture(golden::kPictureA));
+    const Features b = bench.extract(golden_picture(golden::kPictureB));
+    REQUIRE(bench.matcher.match(a, b) == Status::ok);
+    const HypothesisList all = bench.matcher.hypotheses();
+    REQUIRE(all.size() == 4);
+    MatchOptions options;
+    options.max_peaks = 1;
+    REQUIRE(bench.matcher.match(a, b, options) == Status::ok);
+    REQUIRE(bench.matcher.hypotheses().size() == 2);
+    CHECK(bench.matcher.hypotheses()[0].peak == all[0].peak);
+    options = {};
+    options.min_rotation_peak = 0.6F;
+    REQUIRE(bench.matcher.match(a, b, options) == Status::ok);
+    CHECK(bench.matcher.hypotheses().size() == 2);
+    options.min_rotation_peak = 0.9F;
+    REQUIRE(bench.matcher.match(a, b, options) == Status::ok);
+    CHECK(bench.matcher.hypotheses().empty());
+  }
+
+  TEST_CASE("pictures without structure are degenerate and match nothing") {
+    Bench bench(config_of(48));
+    const Features good = bench.extract(golden_picture(golden::kPictureA));
+    for (const std::uint8_t value : std::initializer_list<std::uint8_t>{0, 1, 128, 255}) {
+      const Picture flat(48 * 48, value);
+      Features features = bench.carve();
+      CHECK(bench.matcher.extract({flat.data(), flat.size()}, features) == Status::degenerate);
+      CHECK_FALSE(features.ready);
+      CHECK(bench.matcher.match(good, features) == Status::degenerate);
+      CHECK(bench.matcher.hypotheses().empty());
+      CHECK(bench.matcher.match(features, good) == Status::degenerate);
+    }
+    // A flat picture written into features that were ready takes their readiness away.
+    Features reused = good;
+    const Picture flat(48 * 48, 0);
+    CHECK(bench.matcher.extract({flat.data(), flat.size()}, reused) == Status::degenerate);
+    CHECK_FALSE(reused.ready);
+  }
+
+  TEST_CASE("pictures with little or ambiguous structure give finite numbers") {
+    const std::size_t side = 48;
+    std::vector<Picture> pictures;
+    const auto draw = [&](auto inside) {
+      Picture picture(side * side);
+      for (std::size_t i = 0; i < picture.size(); ++i) {
+        const double x = static_cast<double>(i % side) - 23.5;
+        const double y = static_cast<double>(i / side) - 23.5;
+        picture[i] = inside(x, y) ? 255 : 0;
+      }
+      pictures.push_back(picture);
+    };
+    draw([](double x, double y) { return x == 3.5 && y == -8.5; });                           // one cell
+    draw([](double x, double y) { return x == -23.5 && y == -23.5; });                        // in the corner
+    draw([](double, double y) { return y == 4.5; });                                          // a straight wall
+    draw([](double x, double y) { return std::fabs(std::hypot(x, y) - 12.0) < 0.7; });        // a circle
+    draw([](double x, double y) { return std::fmax(std::fabs(x), std::fabs(y)) == 10.5; });   // a square
+    draw([](double x, double y) { return static_cast<int>(x + 23.5 + y + 23.5) % 2 == 0; });  // a chessboard
+    draw([](double x, double) { return x == -23.5; });                                        // the border
+    pictures.push_back(Picture(side * side, 254));
+    pictures.back()[700] = 255;  // the least contrast there is
+    pictures.push_back(golden_picture(golden::kPictureA));
+    Bench bench(config_of(side));
+    for (const Picture& a : pictures) {
+      for (const Picture& b : pictures) {
+        Features fa = bench.carve();
+        Features fb = bench.carve();
+        const Status extracted_a = bench.matcher.extract({a.data(), a.size()}, fa);
+        const Status extracted_b = bench.matcher.extract({b.data(), b.size()}, fb);
+        const Status matched = bench.matcher.match(fa, fb);
+        CHECK((matched == Status::ok) == (extracted_a == Status::ok && extracted_b == Status::ok));
+        CHECK(all_finite(bench.matcher.hypotheses()));
+      }
+    }
+    // A square looks the same at each quarter turn: the one that is true must be among the hypotheses.
+    const HypothesisList square = bench.match(pictures[4], pictures[4]);
+    bool identity = false;
+    for (const Hypothesis& h : square) {
+      identity = identity || (translation(h.a_T_b) < 0.1 && std::fabs(h.a_T_b.theta) < 0.01);
+    }
+    CHECK(identity);
+  }
+
+  TEST_CASE("hypotheses are sorted and distinct") {
+    Bench bench(config_of(96, 0.4F));
+    const HypothesisList found = bench.match(digest_of(render(office(3), {}, 384, 0.1, 17.0), 384, 96),
+                                             digest_of(render(office(4), {1.0, 2.0, 0.3}, 384, 0.1, 17.0), 384, 96));
+    for (std::size_t i = 1; i < found.size(); ++i) {
+      CHECK(found[i - 1].peak >= found[i].peak);
+      for (std::size_t k = 0; k < i; ++k) {
+        const Error difference = error_of(found[i].a_T_b, found[k].a_T_b);
+        CHECK((difference.metres >= 0.4 || difference.radians >= kPi / 96));
+      }
+    }
+  }
+
+  TEST_CASE("other settings: without low-pass, without high-pass, centre of mass off and wide") {
+    for (int variant = 0; variant < 4; ++variant) {
+      CAPTURE(variant);
+      MatcherConfig config = config_of(96, 0.4F);
+      config.lowpass_sigma = variant == 0 ? 0.0F : 0.25F;
+      config.high_pass = variant != 1;
+      config.com_radius = static_cast<std::uint8_t>(variant == 2 ? 0 : (variant == 3 ? 3 : 1));
+      Bench bench(config);
+      const Pose2 a_T_b{1.7, -2.2, 2.5};
+      const HypothesisList found = bench.match(digest_of(render(office(1), {}, 384, 0.1, 17.0), 384, 96),
+                                               digest_of(render(office(1), a_T_b, 384, 0.1, 17.0), 384, 96));
+      CHECK(error_of(found[0].a_T_b, a_T_b).metres < 2 * 0.4);
+      CHECK(error_of(found[0].a_T_b, a_T_b).radians < 2 * kPi / 96);
+    }
+  }
+
+  TEST_CASE("configurations outside their limits and too little memory are refused") {
+    const auto with = [](auto change) {
+      MatcherConfig config;
+      change(config);
+      return config;
+    };
+    CHECK(is_valid(MatcherConfig{}));
+    const MatcherConfig wrong[] = {with([](auto& c) { c.side = 98; }),
+                                   with([](auto& c) { c.pixel_m = 0.0F; }),
+                                   with([](auto& c) { c.pixel_m = NAN; }),
+                                   with([](auto& c) { c.peak_share = 1.5F; }),
+                                   with([](auto& c) { c.max_peaks = 7; }),
+                                   with([](auto& c) { c.max_peaks = 0; }),
+                                   with([](auto& c) { c.com_radius = 4; }),
+                                   with([](auto& c) { c.lowpass_sigma = -1.0F; }),
+                                   with([](auto& c) { c.whitening_floor = 0.0F; }),
+                                   with([](auto& c) { c.edge_margin = NAN; })};
+    for (const MatcherConfig& config : wrong) {
+      Matcher matcher;
+      CHECK(matcher.init(config, {}) == Status::invalid_config);
+    }
+    Matcher matcher;
+    CHECK(matcher.init(MatcherConfig{}, {}) == Status::insufficient_memory);
+  }
+}
