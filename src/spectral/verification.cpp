@@ -143,6 +143,29 @@ Result<ClassView> classify(const GridView& grid, const VerificationConfig& confi
   return ClassView{Span<const std::uint8_t>(cells), side, grid.cell_m * static_cast<float>(block)};
 }
 
+Result<ClassView> classify(const DigestView& digest, const VerificationConfig& config, Span<std::uint8_t> out) {
+  if (!valid(config)) {
+    return Status::invalid_config;
+  }
+  const std::size_t count = static_cast<std::size_t>(digest.side) * digest.side;
+  if (!valid(digest.obstacles, digest.side, digest.cell_m) || digest.observed.size() != mask_bytes(digest.side) ||
+      digest.free.size() != mask_bytes(digest.side) || out.size() < count) {
+    return Status::invalid_argument;
+  }
+  const Span<std::uint8_t> cells = out.first(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (!mask_bit(digest.observed, i)) {
+      cells[i] = 0;
+    } else if (mask_bit(digest.free, i)) {
+      cells[i] = kClassObserved | kMarkFree;
+    } else {
+      cells[i] = kClassObserved | kClassOccupied;
+    }
+  }
+  finish_classes(cells, digest.side, config);
+  return ClassView{Span<const std::uint8_t>(cells), digest.side, digest.cell_m};
+}
+
 Result<Agreement> verify(const ClassView& a, const ClassView& b, const Pose2& a_T_b, const VerificationConfig& config) {
   if (!valid(config)) {
     return Status::invalid_config;

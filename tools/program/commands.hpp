@@ -6,6 +6,9 @@
 
 namespace mellin::program {
 
-void add_optimize(CLI::App& app);
+void add_map(CLI::App& app);       ///< mellin map
+void add_optimize(CLI::App& app);  ///< mellin optimize
+void add_score(CLI::App& app);     ///< mellin score
+void add_sim(CLI::App& app);       ///< mellin sim
 
 }  // namespace mellin::program

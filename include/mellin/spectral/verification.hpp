@@ -11,6 +11,7 @@
 #include "mellin/core/se2.hpp"
 #include "mellin/core/span.hpp"
 #include "mellin/core/status.hpp"
+#include "mellin/grid/digest.hpp"
 #include "mellin/grid/submap.hpp"
 
 namespace mellin {
@@ -31,7 +32,7 @@ struct ClassView {
 
 struct VerificationConfig {
   /// A grid cell is an obstacle from this many 254ths of hits per observation on (1 to 254).
-  std::uint8_t occupied_from = 64;
+  std::uint8_t occupied_from = 127;
   /// Chebyshev distance, cells of the class grid, within which an occupied cell counts as a hit (0 to 4).
   std::uint8_t near_cells = 1;
   /// Chebyshev distance, cells, that free space must keep from obstacles to contradict one (near_cells to 4). The band
@@ -39,8 +40,11 @@ struct VerificationConfig {
   std::uint8_t clear_cells = 1;
   /// Length of wall, m, that a hypothesis must explain before it counts for one half without any conflict: it keeps
   /// slight overlaps from scoring well by chance.
-  float doubt_m = 6.0F;
+  float doubt_m = 2.0F;
 };
+
+/// Defaults for digests, whose pixels are so large that a hit in the next one says little.
+inline constexpr VerificationConfig kDigestVerification = {127, 0, 0, 6.0F};
 
 /// The evidence for and against a hypothesis. Counts are cells of the class grids.
 struct Agreement {
@@ -60,6 +64,10 @@ struct Agreement {
 /// number; invalid_config: `config` outside its stated limits. Cost: one pass over the grid, one over the classes.
 Result<ClassView> classify(const GridView& grid, const VerificationConfig& config, std::uint16_t side,
                            Span<std::uint8_t> out);
+
+/// The same from a digest with both masks, at its own side: occupied is what is observed and not free. `out` holds at
+/// least side * side bytes. Statuses as above; invalid_argument too where a mask is missing.
+Result<ClassView> classify(const DigestView& digest, const VerificationConfig& config, Span<std::uint8_t> out);
 
 /// Evidence for b lying at a_T_b (poses of the class grids' centres). The grids may differ in side and in cell size;
 /// best close to the same. invalid_argument: a view whose size does not fit, a pose that is not finite;
