@@ -13,14 +13,14 @@
 //    8 u64 config fingerprint        4 u32 group, counting up from 1
 //   16 u32 sequence, from 1          8 u32 id of the submap or blob
 //   20 u32 oldest live sequence     12 u16 part: first tile or number of the chunk
-//   24 u32 erases of this block     14 u16 parts: tiles in the record or chunks in all
+//   24 u32 erases of this block     14 u16 parts: tiles in it; chunk: 1 the last, else 0
 //   28 u32 block size, bytes        16 u16 length of the payload, bytes
 //   32 u32 block count              18 u16 coding of the grid record (GridCoding)
 //   36 u32 program unit, bytes      20 u32 CRC-32 of the payload
 //   40 f32 edge of a cell, m        24 u32 CRC-32 of bytes 0 to 23
 //   44 u8  erased value             28 …   payload, at most 2020 bytes
 //   45 u8 x 7, zero
-//   52 u32 CRC-32 of bytes 0 to 51
+//   52 u32 CRC-32 of bytes 0 to 51; magic, version and this stay where they are in all versions
 //
 //   submap payload, 84 bytes         grid payload: the cells of `parts` tiles from tile `part` on, coded as
 //    0 u32 id                        tile_codec.hpp says, or one raw tile

@@ -60,14 +60,15 @@ class FlashLog {
   /// 4 GiB).
   Status init(const Memory& memory, const mellin_flash& flash, const LogIdentity& identity, Log log);
 
-  /// Starts an empty log behind whatever is there. One erase and one program; a power cut leaves either the old log or
-  /// the new one. Statuses: ok; device_error.
+  /// Starts an empty log behind whatever is there: one erase and one program. A power cut leaves either the new log or
+  /// the old one, less its oldest block where all were in use. Statuses: ok; device_error.
   Status format();
   /// Finds the log's ends: reads one header a block. Statuses: ok; not_found on a blank device; bad_data where nothing
   /// on it is a block header; version_mismatch where the log belongs to another format version, geometry or identity
   /// (both are logged); device_error.
   Status mount();
   bool mounted() const { return mounted_; }
+  void unmount() { mounted_ = open_ = false; }
 
   // Writing.
 
@@ -82,8 +83,12 @@ class FlashLog {
   Status append(const RecordHeader& header, Span<const std::uint8_t> payload);
   /// Programs what is buffered, filled up with erased bytes to the program unit, and syncs. Statuses: ok; device_error.
   Status flush();
-  /// Where the next record will lie in the open block.
+  /// A cursor before whatever is appended next.
   LogCursor head() const;
+  std::uint32_t address(const LogCursor& cursor) const { return cursor.block * flash_.block_size + cursor.offset; }
+  /// Records and their bytes appended since init.
+  std::uint32_t appended_records() const { return appended_records_; }
+  std::uint32_t appended_bytes() const { return appended_bytes_; }
   /// Blocks that open_block can still give.
   std::uint32_t free_blocks() const;
   /// Bytes of records that fit in a fresh block.
@@ -110,14 +115,16 @@ class FlashLog {
  private:
   Status read(std::uint32_t address, Span<std::uint8_t> out) const;
   Status read_block_header(std::uint32_t block, BlockHeader& out) const;
-  Status find_record(std::uint32_t block, std::uint32_t from, LogRecord& out) const;
+  Status record_in_block(std::uint32_t block, std::uint32_t offset, LogRecord& out) const;
   Status search_record(std::uint32_t block, std::uint32_t from, LogRecord& out) const;
-  bool enter_next_block(LogCursor& cursor) const;
+  Status enter_next_block(LogCursor& cursor) const;
   bool live(const BlockHeader& header) const;
-  Status find_newest(bool& blank);
+  Status find_newest(BlockHeader& newest, bool& blank);
   Status find_oldest();
   Status check_identity(const BlockHeader& header) const;
-  Status start_block(std::uint32_t block);
+  Status erase_all();
+  Status start_block(std::uint32_t block, std::uint32_t sequence);
+  Status write_block_header(std::uint32_t erases);
   Status put(Span<const std::uint8_t> bytes);
   Status program_page();
   std::uint32_t after(std::uint32_t block) const { return block + 1 == flash_.block_count ? 0 : block + 1; }
@@ -134,6 +141,8 @@ class FlashLog {
   std::uint32_t oldest_sequence_ = 0;
   std::uint32_t page_address_ = 0;  ///< of page_[0]; a multiple of the program unit
   std::uint32_t fill_ = 0;          ///< bytes in page_
+  std::uint32_t appended_records_ = 0;
+  std::uint32_t appended_bytes_ = 0;
   FlashLogStatistics statistics_;
 };
 

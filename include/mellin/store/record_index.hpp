@@ -41,6 +41,7 @@ class RecordIndex {
   bool remove(std::uint8_t kind, std::uint32_t id);
   /// nullptr where there is none; valid until the next change.
   const IndexEntry* find(std::uint8_t kind, std::uint32_t id) const;
+  bool contains(std::uint8_t kind, std::uint32_t id) const { return find(kind, id) != nullptr; }
   /// The entries of a kind, by ascending id; valid until the next change.
   Span<const IndexEntry> of_kind(std::uint8_t kind) const;
   std::size_t size() const { return size_; }

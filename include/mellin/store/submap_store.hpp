@@ -121,7 +121,8 @@ class SubmapStore {
   /// Starts to commit the group. Statuses: ok; invalid_argument without a group; busy.
   Status commit();
   /// One slice of what was started: codes a tile, or appends a record of at most 2 KiB, or erases a block, or syncs.
-  /// Statuses: busy: call again; ok: done; full, device_error: the group is given up and will be absent.
+  /// Statuses: busy: call again; ok: done; full, device_error, lost (the flash did not keep what was written): the
+  /// group is given up. It will be absent, unless the device failed in the commit itself: then only a mount can tell.
   Status step();
   /// Gives the open group up; what was written of it is garbage. Nothing happens without one.
   void abandon_group();
@@ -175,21 +176,24 @@ class SubmapStore {
   bool has_flash() const { return flash_blocks_ != 0; }
   Status ready_to_put() const;
   bool fits(const GroupSize& size) const;
-  Status start_submap(const SubmapHeader& header, const GridView& grid);
+  Status check_put(const SubmapHeader& header, const GridView& grid) const;
   Status start_remove(std::uint8_t kind, std::uint32_t id);
   Status step_job();
   Status step_blob();
   Status step_remove();
   Status step_commit();
-  Status append(RecordHeader header, Span<const std::uint8_t> payload);
+  Status write_commit();
   Status finish_commit();
-  void finish_submap_slot();
+  Status reserve(std::uint8_t kind, std::uint32_t id);
+  Status make_room(std::size_t bytes);
+  RecordHeader record(RecordType type, std::uint8_t kind, std::uint32_t id) const;
+  void publish_slot();
   void end_group();
 
   Status replay();
-  Status apply_group(LogCursor from, std::uint32_t group, std::uint32_t end_address, std::uint32_t& records);
+  Status apply_group(LogCursor from, const LogRecord& commit_record);
   Status apply_record(const LogRecord& record);
-  bool index_has_room(std::uint8_t kind, std::uint32_t id) const;
+  Status next_of_submap(const LogRecord& first, LogCursor& cursor, LogRecord& out) const;
 
   StoreConfig config_;
   Log log_sink_;
@@ -203,11 +207,14 @@ class SubmapStore {
   bool group_open_ = false;
   Job job_ = Job::none;
   CommitStage commit_stage_ = CommitStage::flush;
+  LogRecord commit_record_;
   std::uint32_t group_ = 0;           ///< number of the open group, or of the last one there was
   std::uint32_t previous_group_ = 0;  ///< the last committed one
-  bool group_started_ = false;        ///< whether a record of it was appended
-  LogCursor group_begin_;             ///< where that lies
-  Commit commit_;
+  std::uint32_t new_submaps_ = 0;     ///< in the open group, not known before
+  std::uint32_t new_blobs_ = 0;
+  LogCursor group_begin_;             ///< before its first record
+  std::uint32_t records_before_ = 0;  ///< the log's counts when the group began
+  std::uint32_t bytes_before_ = 0;
   SlotHandle writing_slot_;
   SubmapId writing_id_ = kNoSubmap;
   BlobKind blob_kind_ = 0;
@@ -218,6 +225,7 @@ class SubmapStore {
 
   SlotHandle fetch_slot_;
   SubmapId fetch_id_ = kNoSubmap;
+  std::uint32_t fetch_address_ = 0;
   std::uint32_t lost_records_ = 0;
 };
 

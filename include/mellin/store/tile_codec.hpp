@@ -39,8 +39,8 @@ struct TileRect {
 /// Requires tile < tile_count(side).
 TileRect tile_rect(std::uint16_t side, std::uint32_t tile);
 
-/// Copies the tile's cells from or to a grid of side * side cells; returns how many.
-std::size_t gather_tile(const GridView& grid, const TileRect& rect, Span<std::uint8_t> out);
+/// Copies the tile's cells, in raster order, from or to a grid of side * side cells.
+void gather_tile(const GridView& grid, const TileRect& rect, Span<std::uint8_t> tile);
 void scatter_tile(Span<const std::uint8_t> tile, const TileRect& rect, std::uint16_t side, Span<std::uint8_t> cells);
 
 /// Adaptive probabilities of the binary decisions.
@@ -68,13 +68,14 @@ class TileEncoder {
   /// Starts a record's payload in `out`.
   void begin(Span<std::uint8_t> out);
   /// Codes one tile more. Where the outcome is not `added`, nothing was written, and the record has to be finished.
-  Outcome add(const GridView& grid, const TileRect& rect);
+  /// `tile`: rect.cells() cells in raster order; they are not changed.
+  Outcome add(Span<std::uint8_t> tile, const TileRect& rect);
   /// Ends the payload and returns its length. At most the size of `out`.
   std::size_t finish();
   std::uint16_t tiles() const { return tiles_; }
 
  private:
-  friend struct TileCoding;
+  friend class TileCoding;
   void code(std::uint16_t& probability, bool& bit);
   void emit(std::uint8_t byte);
 
@@ -94,11 +95,11 @@ class TileDecoder {
  public:
   /// Starts with a record's payload, which must outlive the decoding.
   void begin(Span<const std::uint8_t> in);
-  /// Decodes the next tile into the grid's cells.
-  void next(const TileRect& rect, std::uint16_t side, Span<std::uint8_t> cells);
+  /// Decodes the next tile: rect.cells() cells in raster order.
+  void next(Span<std::uint8_t> tile, const TileRect& rect);
 
  private:
-  friend struct TileCoding;
+  friend class TileCoding;
   void code(std::uint16_t& probability, bool& bit);
   std::uint8_t take();
 
