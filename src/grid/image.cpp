@@ -1,0 +1,256 @@
+#include "mellin/grid/image.hpp"
+
+#include <algorithm>
+#include <cassert>
+
+#include "grid/thicken.hpp"
+#include "mellin/core/math.hpp"
+
+namespace mellin {
+
+namespace {
+
+/// Half of a Gaussian kernel, centre first, that sums to 1 over both sides.
+void gaussian_kernel(double sigma, Span<float> half) {
+  double sum = 0.0;
+  for (std::size_t i = 0; i < half.size(); ++i) {
+    const double x = static_cast<double>(i) / sigma;
+    sum += (i == 0 ? 1.0 : 2.0) * exp(-0.5 * x * x);
+  }
+  for (std::size_t i = 0; i < half.size(); ++i) {
+    const double x = static_cast<double>(i) / sigma;
+    half[i] = static_cast<float>(exp(-0.5 * x * x) / sum);
+  }
+}
+
+/// Index i - offset or i + offset mirrored into [0, side) without repeating the border pixel.
+std::size_t mirrored_below(std::size_t i, std::size_t offset) { return i >= offset ? i - offset : offset - i; }
+std::size_t mirrored_above(std::size_t i, std::size_t offset, std::size_t side) {
+  return i + offset < side ? i + offset : 2 * (side - 1) - (i + offset);
+}
+
+/// out = `line` (side pixels) under the kernel, cyclically.
+void convolve_cyclic(const float* line, std::size_t side, Span<const float> kernel, float* out) {
+  for (std::size_t i = 0; i < side; ++i) {
+    float sum = kernel[0] * line[i];
+    for (std::size_t k = 1; k < kernel.size(); ++k) {
+      const std::size_t before = i >= k ? i - k : i + side - k;
+      const std::size_t behind = i + k < side ? i + k : i + k - side;
+      sum += kernel[k] * (line[before] + line[behind]);
+    }
+    out[i] = sum;
+  }
+}
+
+}  // namespace
+
+bool is_consistent(const ImageView& image) {
+  return image.side > 0 && image.pixels.data() != nullptr &&
+         image.pixels.size() == std::size_t{image.side} * image.side;
+}
+
+Status obstacle_image(const GridView& grid, const ImageView& out) {
+  const bool valid = is_consistent(out) && grid.side == out.side && grid.cells.size() == out.pixels.size();
+  assert(valid);
+  if (!valid) {
+    return Status::invalid_argument;
+  }
+  for (std::size_t i = 0; i < grid.cells.size(); ++i) {
+    out.pixels[i] = hit_share(grid.cells[i]);
+  }
+  return Status::ok;
+}
+
+Status thicken(const ImageView& in, const ImageView& out) {
+  const bool valid = is_consistent(in) && is_consistent(out) && in.side == out.side;
+  assert(valid);
+  if (!valid) {
+    return Status::invalid_argument;
+  }
+  const std::size_t last = in.side - 1U;
+  for (std::size_t r = 0; r <= last; ++r) {
+    const float* const above = in.row(r == 0 ? 0 : r - 1);
+    const float* const middle = in.row(r);
+    const float* const below = in.row(std::min(r + 1, last));
+    const auto column_maximum = [=](std::size_t c) { return std::max(std::max(above[c], middle[c]), below[c]); };
+    float left = column_maximum(0);
+    float centre = left;
+    for (std::size_t c = 0; c <= last; ++c) {
+      const float right = column_maximum(std::min(c + 1, last));
+      out.row(r)[c] = std::max(std::max(left, centre), right);
+      left = centre;
+      centre = right;
+    }
+  }
+  return Status::ok;
+}
+
+Status blur(const ImageView& in, const ImageView& out, Span<float> line) {
+  const bool valid =
+      is_consistent(in) && is_consistent(out) && in.side == out.side && in.side >= 5 && line.size() >= in.side;
+  assert(valid);
+  if (!valid) {
+    return Status::invalid_argument;
+  }
+  constexpr std::size_t kRadius = 4;
+  float kernel[kRadius + 1] = {};
+  gaussian_kernel(1.0, kernel);
+  const std::size_t side = in.side;
+  for (std::size_t r = 0; r < side; ++r) {
+    for (std::size_t c = 0; c < side; ++c) {
+      float sum = kernel[0] * in.row(r)[c];
+      for (std::size_t k = 1; k <= kRadius; ++k) {
+        sum += kernel[k] * (in.row(mirrored_below(r, k))[c] + in.row(mirrored_above(r, k, side))[c]);
+      }
+      line[c] = sum;
+    }
+    for (std::size_t c = 0; c < side; ++c) {
+      float sum = kernel[0] * line[c];
+      for (std::size_t k = 1; k <= kRadius; ++k) {
+        sum += kernel[k] * (line[mirrored_below(c, k)] + line[mirrored_above(c, k, side)]);
+      }
+      out.row(r)[c] = sum;
+    }
+  }
+  return Status::ok;
+}
+
+Status halve(const ImageView& in, const ImageView& out) {
+  const bool valid = is_consistent(in) && is_consistent(out) && in.side == 2 * out.side;
+  assert(valid);
+  if (!valid) {
+    return Status::invalid_argument;
+  }
+  for (std::size_t r = 0; r < out.side; ++r) {
+    for (std::size_t c = 0; c < out.side; ++c) {
+      const float upper = in.row(2 * r)[2 * c] + in.row(2 * r)[2 * c + 1];
+      const float lower = in.row(2 * r + 1)[2 * c] + in.row(2 * r + 1)[2 * c + 1];
+      out.row(r)[c] = 0.25F * (upper + lower);
+    }
+  }
+  return Status::ok;
+}
+
+Status thicken_and_halve(const ImageView& in, const ImageView& out, std::size_t first, std::size_t count) {
+  const bool valid = is_consistent(in) && is_consistent(out) && in.side == 2 * out.side && first <= out.side &&
+                     count <= out.side - first;
+  assert(valid);
+  if (!valid) {
+    return Status::invalid_argument;
+  }
+  const auto read = [&in](std::size_t column, std::size_t row) { return in.row(row)[column]; };
+  for (std::size_t r = first; r < first + count; ++r) {
+    thicken_and_halve_row(read, in.side, r, out.row(r));
+  }
+  return Status::ok;
+}
+
+float normalise(const ImageView& image) {
+  assert(is_consistent(image));
+  float largest = 0.0F;
+  for (const float pixel : image.pixels) {
+    largest = std::max(largest, pixel);
+  }
+  if (largest > 0.0F) {
+    for (float& pixel : image.pixels) {
+      pixel /= largest;
+    }
+  }
+  return largest;
+}
+
+Status EdgeBlur::begin(const ImageView& image, std::uint16_t margin_pixels, Span<float> scratch) {
+  const bool valid = is_consistent(image) && margin_pixels > 0 && 4 * margin_pixels <= image.side &&
+                     scratch.size() >= scratch_size(image.side, margin_pixels);
+  assert(valid);
+  if (!valid) {
+    image_ = {};
+    return Status::invalid_argument;
+  }
+  image_ = image;
+  margin_ = margin_pixels;
+  next_ = 0;
+  const std::size_t band = 2 * margin_ * image.side;
+  rows_ = scratch.first(band);
+  columns_ = scratch.subspan(band, band);
+  line_ = scratch.subspan(2 * band, image.side);
+  kernel_ = scratch.subspan(2 * band + image.side, 2 * margin_ + 1);
+  gaussian_kernel(static_cast<double>(margin_) / 2.0, kernel_);
+  return Status::ok;
+}
+
+bool EdgeBlur::step(std::size_t lines) {
+  const std::size_t band = 2 * margin_;
+  const std::size_t all = 2 * band + image_.side;
+  for (std::size_t i = 0; i < lines && next_ < all && image_.side > 0; ++i, ++next_) {
+    if (next_ < band) {
+      blur_row(next_);
+    } else if (next_ < 2 * band) {
+      blur_column(next_ - band);
+    } else {
+      blend_row(next_ - 2 * band);
+    }
+  }
+  return image_.side == 0 || next_ == all;
+}
+
+/// The band lies across the seam of the periodic picture: its first half ends at the last row, its second begins at 0.
+void EdgeBlur::blur_row(std::size_t band_row) {
+  const std::size_t side = image_.side;
+  const std::size_t centre = (side - margin_ + band_row) % side;
+  const float* const middle = image_.row(centre);
+  for (std::size_t c = 0; c < side; ++c) {
+    line_[c] = kernel_[0] * middle[c];
+  }
+  for (std::size_t k = 1; k < kernel_.size(); ++k) {
+    const float* const before = image_.row((centre + side - k) % side);
+    const float* const behind = image_.row((centre + k) % side);
+    const float weight = kernel_[k];
+    for (std::size_t c = 0; c < side; ++c) {
+      line_[c] += weight * (before[c] + behind[c]);
+    }
+  }
+  convolve_cyclic(line_.data(), side, kernel_, rows_.data() + band_row * side);
+}
+
+void EdgeBlur::blur_column(std::size_t band_column) {
+  const std::size_t side = image_.side;
+  const std::size_t centre = (side - margin_ + band_column) % side;
+  for (std::size_t r = 0; r < side; ++r) {
+    const float* const row = image_.row(r);
+    float sum = kernel_[0] * row[centre];
+    for (std::size_t k = 1; k < kernel_.size(); ++k) {
+      const std::size_t before = centre >= k ? centre - k : centre + side - k;
+      const std::size_t behind = centre + k < side ? centre + k : centre + k - side;
+      sum += kernel_[k] * (row[before] + row[behind]);
+    }
+    line_[r] = sum;
+  }
+  convolve_cyclic(line_.data(), side, kernel_, columns_.data() + band_column * side);
+}
+
+void EdgeBlur::blend_row(std::size_t r) {
+  const std::size_t side = image_.side;
+  float* const row = image_.row(r);
+  const std::size_t row_distance = std::min(r, side - 1 - r);
+  const auto band_index = [this, side](std::size_t i) { return i < margin_ ? i + margin_ : i - (side - margin_); };
+  const auto share = [this](std::size_t distance) {
+    return static_cast<float>(distance) / static_cast<float>(margin_);
+  };
+  if (row_distance < margin_) {
+    const float* const blurred = rows_.data() + band_index(r) * side;
+    for (std::size_t c = 0; c < side; ++c) {
+      const float keep = share(std::min(row_distance, std::min(c, side - 1 - c)));
+      row[c] = keep * row[c] + (1.0F - keep) * blurred[c];
+    }
+    return;
+  }
+  for (std::size_t i = 0; i < margin_; ++i) {
+    const float keep = share(i);
+    for (const std::size_t c : {i, side - 1 - i}) {
+      row[c] = keep * row[c] + (1.0F - keep) * columns_[band_index(c) * side + r];
+    }
+  }
+}
+
+}  // namespace mellin

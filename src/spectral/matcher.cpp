@@ -1,0 +1,251 @@
+// Set-up, and the order of the passes; the passes themselves are in extract.cpp and match.cpp.
+#include "mellin/spectral/matcher.hpp"
+
+#include <algorithm>
+#include <cassert>
+
+namespace mellin {
+
+namespace {
+
+/// Along one axis; the filter of two axes is the product. Frequency i over side / 2 means i - side.
+void fill_lowpass(float sigma, Span<float> lowpass) {
+  const std::size_t side = lowpass.size();
+  for (std::size_t i = 0; i < side; ++i) {
+    const double frequency = static_cast<double>(std::min(i, side - i)) / static_cast<double>(side);
+    const double x = sigma > 0.0F ? frequency / static_cast<double>(sigma) : 0.0;
+    lowpass[i] = static_cast<float>(exp(-0.5 * x * x));
+  }
+}
+
+/// Half a turn in `side` steps, from -90 degrees on: the half plane that a spectrum stores.
+void fill_directions(Span<Complex> directions) {
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    const SinCos turn = sincos(kPi * static_cast<double>(i) / static_cast<double>(directions.size()));
+    directions[i] = {static_cast<float>(turn.sin), static_cast<float>(-turn.cos)};
+  }
+}
+
+bool fits(const Features& features, std::uint16_t side) {
+  return (features.image.empty() || features.image.size() == Features::image_count(side)) &&
+         (features.filter.empty() || features.filter.size() == Features::filter_count(side)) &&
+         features.rings.size() == Features::rings_count(side);
+}
+
+}  // namespace
+
+Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
+  stage_ = Stage::idle;
+  if (!is_valid(config)) {
+    return Status::invalid_config;
+  }
+  const std::size_t side = config.side;
+  const bool enough = memory.first.size() == spectrum_size(config.side) &&
+                      memory.second.size() == memory.first.size() && memory.rows.size() == Fft2::kBlock * side &&
+                      memory.lines.size() == 3 * side && memory.directions.size() == side &&
+                      memory.lowpass.size() == side && memory.correlation.size() == side;
+  if (!enough) {
+    return Status::insufficient_memory;
+  }
+  const Status planned = fft_.init(config.side, memory.fft);
+  if (planned != Status::ok) {
+    return planned;
+  }
+  config_ = config;
+  memory_ = memory;
+  margin_ = EdgeBlur::margin(config.side, config.edge_margin);
+  fill_lowpass(config.lowpass_sigma, memory.lowpass);
+  fill_directions(memory.directions);
+  double sum = 0.0;
+  for (const float weight : memory.lowpass) {
+    sum += static_cast<double>(weight);
+  }
+  filter_scale_ = static_cast<float>(1.0 / (sum * sum));
+  return Status::ok;
+}
+
+Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out) {
+  const bool valid =
+      fft_.side() > 0 && picture.size() == Features::image_count(config_.side) && fits(out, config_.side);
+  assert(valid);
+  stage_ = Stage::idle;
+  out.ready = false;
+  if (!valid) {
+    return status_ = Status::invalid_argument;
+  }
+  picture_ = picture;
+  out_ = &out;
+  lowest_ = 255;
+  highest_ = 0;
+  sum_ = 0.0;
+  status_ = Status::ok;
+  stage_ = Stage::load;
+  line_ = 0;
+  return Status::ok;
+}
+
+Status Matcher::begin_match(const Features& a, const Features& b, const MatchOptions& options) {
+  const bool valid =
+      fft_.side() > 0 && fits(a, config_.side) && fits(b, config_.side) && !a.filter.empty() && !b.image.empty();
+  assert(valid);
+  stage_ = Stage::idle;
+  hypotheses_.clear();
+  if (!valid) {
+    return status_ = Status::invalid_argument;
+  }
+  if (!a.ready || !b.ready) {
+    return status_ = Status::degenerate;
+  }
+  a_ = a;
+  b_ = b;
+  options_ = options;
+  std::fill(cross_spectrum().begin(), cross_spectrum().end(), Complex{});
+  status_ = Status::ok;
+  stage_ = Stage::correlate_rings;
+  line_ = 0;
+  return Status::ok;
+}
+
+bool Matcher::step() {
+  if (stage_ == Stage::idle) {
+    return true;
+  }
+  const std::size_t all = lines_of(stage_);
+  const std::size_t left = all - line_;
+  const std::size_t count = config_.lines_per_step == 0 ? left : std::min<std::size_t>(left, config_.lines_per_step);
+  run(stage_, line_, count);
+  line_ += count;
+  if (line_ == all) {
+    stage_ = after(stage_);
+    line_ = 0;
+  }
+  return stage_ == Stage::idle;
+}
+
+std::size_t Matcher::lines_of(Stage stage) const {
+  const std::size_t side = config_.side;
+  switch (stage) {
+    case Stage::load:
+    case Stage::picture_rows:
+    case Stage::turned_rows:
+    case Stage::surface_rows:
+      return side;
+    case Stage::blur_edges:
+      return side + 4 * std::size_t{margin_};
+    case Stage::picture_columns:
+    case Stage::whiten:
+    case Stage::turned_columns:
+      return side / 2 + 1;
+    case Stage::rings:
+    case Stage::scale_rings:
+    case Stage::correlate_rings:
+      return side / 2;
+    case Stage::find_rotations:
+    case Stage::locate_peak:
+    case Stage::idle:
+      break;
+  }
+  return 1;
+}
+
+void Matcher::run(Stage stage, std::size_t first, std::size_t count) {
+  switch (stage) {
+    case Stage::load:
+      return load_rows(first, count);
+    case Stage::blur_edges:
+      return blur_edges(first, count);
+    case Stage::picture_rows:
+      return transform_picture_rows(first, count);
+    case Stage::picture_columns:
+      return transform_picture_columns(first, count);
+    case Stage::whiten:
+      return whiten_columns(first, count);
+    case Stage::rings:
+      return sample_rings(first, count);
+    case Stage::scale_rings:
+      return scale_rings(first, count);
+    case Stage::correlate_rings:
+      return correlate_rings(first, count);
+    case Stage::find_rotations:
+      return find_rotations();
+    case Stage::turned_rows:
+      return transform_turned_rows(first, count);
+    case Stage::turned_columns:
+      return filter_turned_columns(first, count);
+    case Stage::surface_rows:
+      return search_surface_rows(first, count);
+    case Stage::locate_peak:
+      return locate_peak();
+    case Stage::idle:
+      return;
+  }
+}
+
+/// What follows a finished pass; also ends a job that turns out to be without an answer.
+Matcher::Stage Matcher::after(Stage stage) {
+  switch (stage) {
+    case Stage::load:
+      if (lowest_ == highest_) {
+        status_ = Status::degenerate;
+        return Stage::idle;
+      }
+      return Stage::blur_edges;
+    case Stage::blur_edges:
+      return Stage::picture_rows;
+    case Stage::picture_rows:
+      return Stage::picture_columns;
+    case Stage::picture_columns:
+      end_magnitudes();
+      return out_->filter.empty() ? Stage::rings : Stage::whiten;
+    case Stage::whiten:
+      return Stage::rings;
+    case Stage::rings:
+      if (!(sum_ > 0.0)) {
+        status_ = Status::degenerate;
+        return Stage::idle;
+      }
+      return Stage::scale_rings;
+    case Stage::scale_rings:
+      out_->ready = true;
+      return Stage::idle;
+    case Stage::correlate_rings:
+      return Stage::find_rotations;
+    case Stage::find_rotations:
+      rotation_ = 0;
+      return rotation_count_ == 0 ? Stage::idle : Stage::turned_rows;
+    case Stage::turned_rows:
+      return Stage::turned_columns;
+    case Stage::turned_columns:
+      half_turn_ = false;
+      best_ = 0.0F;
+      return Stage::surface_rows;
+    case Stage::surface_rows:
+      return Stage::locate_peak;
+    case Stage::locate_peak:
+      if (!half_turn_) {
+        half_turn_ = true;
+        best_ = 0.0F;
+        return Stage::surface_rows;
+      }
+      return ++rotation_ == rotation_count_ ? Stage::idle : Stage::turned_rows;
+    case Stage::idle:
+      break;
+  }
+  return Stage::idle;
+}
+
+Status Matcher::extract(Span<const std::uint8_t> picture, Features& out) {
+  const Status begun = begin_extract(picture, out);
+  while (!step()) {
+  }
+  return begun == Status::ok ? status_ : begun;
+}
+
+Status Matcher::match(const Features& a, const Features& b, const MatchOptions& options) {
+  const Status begun = begin_match(a, b, options);
+  while (!step()) {
+  }
+  return begun == Status::ok ? status_ : begun;
+}
+
+}  // namespace mellin
