@@ -28,10 +28,6 @@ FORBIDDEN = [
     ("libm transcendental", rf"(__)?({TRANSCENDENTAL})[fl]?(_finite)?"),
 ]
 
-# KissFFT computes its twiddle factors once, when a plan is set up, in double, and rounds them to float.
-KISSFFT_OBJECT = r"kiss_fftr?\.c\.(o|obj)"
-KISSFFT_MAY = r"sin|cos|sincos"
-
 # All that the library may ask of its surroundings: what a compiler may call by itself, and exact arithmetic.
 ALLOWED = "|".join([
     r"mem(cpy|move|set|cmp)|strlen|strcmp",
@@ -64,8 +60,6 @@ def symbols(nm, archive):
 def findings(all_symbols):
     defined = {name for _, name, kind, _ in all_symbols if kind not in "Uvw"}
     for member, name, kind, section in all_symbols:
-        if re.fullmatch(KISSFFT_OBJECT, member) and re.fullmatch(KISSFFT_MAY, name):
-            continue
         bad = kind_of(name)
         if bad:
             yield member, bad, name
