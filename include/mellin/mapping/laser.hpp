@@ -8,8 +8,8 @@
 
 namespace mellin {
 
-/// Scanners on one base (front and rear, for instance).
-inline constexpr std::size_t kMaxLasers = 2;
+/// Scanners that a configuration can name: front and rear, or those of the robots whose logs are mapped together.
+inline constexpr std::size_t kMaxLasers = 4;
 
 struct LaserConfig {
   std::uint16_t beams = 0;                    ///< ranges a scan has, 1 to 4096; 0: there is no such laser

@@ -1,0 +1,191 @@
+#include "host/settings.hpp"
+
+#include <charconv>
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <stdexcept>
+#include <type_traits>
+
+namespace mellin::host {
+namespace {
+
+/// Calls visit(name, field) for each setting. Fields that resolved() overwrites are not among them.
+template <class C, class Visit>
+void visit_settings(C& c, Visit&& visit) {
+  visit("side", c.side);
+  visit("cell_m", c.cell_m);
+  visit("remembered_scans", c.remembered_scans);
+  visit("screening_side", c.screening_side);
+  visit("registration_side", c.registration_side);
+  visit("class_side", c.class_side);
+  visit("max_submaps", c.max_submaps);
+  visit("max_sessions", c.max_sessions);
+  visit("grid_slots", c.grid_slots);
+  visit("seed", c.seed);
+  visit("mapper.particles", c.mapper.particles);
+  visit("mapper.spare_scans", c.mapper.spare_scans);
+  visit("mapper.take_distance_m", c.mapper.take_distance_m);
+  visit("mapper.take_angle_rad", c.mapper.take_angle_rad);
+  visit("mapper.resample_share", c.mapper.resample_share);
+  visit("mapper.proposal_spread", c.mapper.proposal_spread);
+  visit("mapper.noise.distance_base_m", c.mapper.noise.distance_base_m);
+  visit("mapper.noise.distance_per_m", c.mapper.noise.distance_per_m);
+  visit("mapper.noise.distance_per_rad", c.mapper.noise.distance_per_rad);
+  visit("mapper.noise.angle_base_rad", c.mapper.noise.angle_base_rad);
+  visit("mapper.noise.angle_per_m", c.mapper.noise.angle_per_m);
+  visit("mapper.noise.angle_per_rad", c.mapper.noise.angle_per_rad);
+  visit("matcher.search_points", c.mapper.matcher.search_points);
+  visit("matcher.search_distance_m", c.mapper.matcher.search_distance_m);
+  visit("matcher.search_angle_rad", c.mapper.matcher.search_angle_rad);
+  visit("matcher.search_angle_step_rad", c.mapper.matcher.search_angle_step_rad);
+  visit("matcher.max_iterations", c.mapper.matcher.max_iterations);
+  visit("matcher.scan_weight", c.mapper.matcher.scan_weight);
+  visit("matcher.min_inlier_share", c.mapper.matcher.min_inlier_share);
+  visit("submaps.max_path_m", c.submaps.max_path_m);
+  visit("submaps.every_scans", c.submaps.every_scans);
+  visit("submaps.every_path_m", c.submaps.every_path_m);
+  visit("submaps.band_rows", c.submaps.band_rows);
+  visit("screening.peak_share", c.screening.matcher.peak_share);
+  visit("screening.max_peaks", c.screening.matcher.max_peaks);
+  visit("screening.verified", c.screening.verified);
+  visit("screening.cache_features", c.screening.cache_features);
+  visit("registration.peak_share", c.registration.matcher.peak_share);
+  visit("registration.max_peaks", c.registration.matcher.max_peaks);
+  visit("registration.aligned", c.registration.aligned);
+  visit("registration.alignment.max_points", c.registration.alignment.max_points);
+  visit("collection.close_loops", c.collection.close_loops);
+  visit("collection.candidates", c.collection.candidates);
+  visit("collection.candidate_agreement", c.collection.candidate_agreement);
+  visit("collection.odometry.base_m", c.collection.odometry.base_m);
+  visit("collection.odometry.per_m", c.collection.odometry.per_m);
+  visit("collection.odometry.base_rad", c.collection.odometry.base_rad);
+  visit("collection.odometry.per_m_rad", c.collection.odometry.per_m_rad);
+  visit("linker.pending", c.collection.linker.pending);
+  visit("linker.graph_gate_chi2", c.collection.linker.graph_gate_chi2);
+  visit("linker.pair_gate_chi2", c.collection.linker.pair_gate_chi2);
+  visit("linker.loop_witnesses", c.collection.linker.loop_witnesses);
+  visit("linker.merge_witnesses", c.collection.linker.merge_witnesses);
+  visit("linker.single_sigma_m", c.collection.linker.single_sigma_m);
+  visit("linker.single_sigma_rad", c.collection.linker.single_sigma_rad);
+  visit("linker.single_agreement", c.collection.linker.single_agreement);
+  visit("linker.min_agreement", c.collection.linker.min_agreement);
+  visit("linker.min_overlap", c.collection.linker.min_overlap);
+  visit("linker.warp_sigma_m", c.collection.linker.warp_sigma_m);
+  visit("linker.warp_sigma_rad", c.collection.linker.warp_sigma_rad);
+  visit("linker.information_share", c.collection.linker.information_share);
+  visit("graph.max_edges", c.collection.graph.max_edges);
+  visit("graph.max_fill", c.collection.graph.max_fill);
+}
+
+template <class T>
+void parse(const std::string& key, const std::string& value, T& field) {
+  const auto refuse = [&](const std::string& expected) {
+    throw std::invalid_argument(key + ": expected " + expected + ", found '" + value + "'");
+  };
+  const char* const first = value.data();
+  const char* const last = first + value.size();
+  if constexpr (std::is_same_v<T, bool>) {
+    if (value == "true" || value == "1" || value == "on") {
+      field = true;
+    } else if (value == "false" || value == "0" || value == "off") {
+      field = false;
+    } else {
+      refuse("true or false");
+    }
+  } else if constexpr (std::is_integral_v<T>) {
+    std::uint64_t number = 0;
+    const auto [end, error] = std::from_chars(first, last, number);
+    if (error != std::errc{} || end != last || number > std::numeric_limits<T>::max()) {
+      refuse("a whole number from 0 to " + std::to_string(std::numeric_limits<T>::max()));
+    }
+    field = static_cast<T>(number);
+  } else {
+    double number = 0.0;
+    const auto [end, error] = std::from_chars(first, last, number);
+    if (error != std::errc{} || end != last || !std::isfinite(number)) {
+      refuse("a number");
+    }
+    field = static_cast<T>(number);
+  }
+}
+
+std::string trimmed(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(" \t\r");
+  return first == std::string::npos ? "" : text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
+}
+
+}  // namespace
+
+Config profile_named(const std::string& name) {
+  if (name == "desktop") {
+    return desktop_profile();
+  }
+  if (name == "micro") {
+    return micro_profile();
+  }
+  if (name == "nano") {
+    return nano_profile();
+  }
+  throw std::invalid_argument("profile: expected desktop, micro or nano, found '" + name + "'");
+}
+
+void apply_setting(Config& config, const std::string& key, const std::string& value) {
+  bool found = false;
+  visit_settings(config, [&](const char* name, auto& field) {
+    if (key == name) {
+      parse(key, value, field);
+      found = true;
+    }
+  });
+  if (!found) {
+    std::string names;
+    visit_settings(config,
+                   [&](const char* name, const auto&) { names += std::string(names.empty() ? "" : ", ") + name; });
+    throw std::invalid_argument("no setting is called '" + key + "'; there are: " + names);
+  }
+}
+
+void apply_setting(Config& config, const std::string& assignment) {
+  const std::size_t equals = assignment.find('=');
+  if (equals == std::string::npos) {
+    throw std::invalid_argument("expected key=value, found '" + assignment + "'");
+  }
+  apply_setting(config, trimmed(assignment.substr(0, equals)), trimmed(assignment.substr(equals + 1)));
+}
+
+void apply_settings_file(Config& config, const std::string& path) {
+  std::ifstream in(path);
+  if (!in) {
+    throw std::runtime_error(path + ": cannot be opened");
+  }
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
+    const std::string text = trimmed(line.substr(0, line.find('#')));
+    if (text.empty()) {
+      continue;
+    }
+    try {
+      apply_setting(config, text);
+    } catch (const std::exception& error) {
+      throw std::runtime_error(path + ":" + std::to_string(number) + ": " + error.what());
+    }
+  }
+}
+
+std::vector<std::pair<std::string, ConfigValue>> list_settings(const Config& config) {
+  std::vector<std::pair<std::string, ConfigValue>> out;
+  visit_settings(config, [&](const char* name, const auto& field) {
+    using T = std::decay_t<decltype(field)>;
+    if constexpr (std::is_same_v<T, bool>) {
+      out.emplace_back(name, field);
+    } else if constexpr (std::is_integral_v<T>) {
+      out.emplace_back(name, static_cast<std::int64_t>(field));
+    } else {
+      out.emplace_back(name, static_cast<double>(field));
+    }
+  });
+  return out;
+}
+
+}  // namespace mellin::host
