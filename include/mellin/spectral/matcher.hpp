@@ -119,7 +119,7 @@ class Matcher {
     Span<Complex> first;       ///< a spectrum
     Span<Complex> second;      ///< a spectrum; scratch memory of extract()
     Span<float> rows;          ///< Fft2::kBlock rows of an image
-    Span<Complex> lines;       ///< three columns of a spectrum
+    Span<Complex> lines;       ///< three times kFftLanes columns of a spectrum
     Span<Complex> directions;  ///< cosine and sine of each angle
     Span<float> lowpass;       ///< along one axis
     Span<float> correlation;   ///< over the angles
@@ -133,7 +133,7 @@ class Matcher {
     m.first = arena.template take<Complex>(spectrum_size(config.side), Part::spectral);
     m.second = arena.template take<Complex>(spectrum_size(config.side), Part::spectral);
     m.rows = arena.template take<float>(Fft2::kBlock * side, Part::spectral, Region::fast);
-    m.lines = arena.template take<Complex>(3 * side, Part::spectral, Region::fast);
+    m.lines = arena.template take<Complex>(3 * kFftLanes * side, Part::spectral, Region::fast);
     m.directions = arena.template take<Complex>(side, Part::spectral);
     m.lowpass = arena.template take<float>(side, Part::spectral, Region::fast);
     m.correlation = arena.template take<float>(side, Part::spectral);
