@@ -132,7 +132,7 @@ void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
     fft_.forward_lines(lines, columns, turned);
     for (std::size_t i = 0; i < columns * side; ++i) {
       const Complex z = turned[i];
-      const float weight = 1.0F / (sqrt(z.re * z.re + z.im * z.im) + floor);
+      const float weight = 1.0F / (std::sqrt(z.re * z.re + z.im * z.im) + floor);
       const float re = weight * z.re;
       const float im = weight * z.im;
       const float rr = filter[i].re * re;
