@@ -110,7 +110,9 @@ TEST_SUITE("fft2") {
       for (const auto& spot : spots) {
         const std::complex<double> expected = coefficient(image, side, spot[0], spot[1]);
         const Complex actual = spectrum[spot[0] * side + spot[1]];
-        CHECK(std::abs(expected - std::complex<double>(actual.re, actual.im)) < 2e-6 * side * side);
+        CHECK(
+            std::abs(expected - std::complex<double>(static_cast<double>(actual.re), static_cast<double>(actual.im))) <
+            2e-6 * static_cast<double>(side) * side);
       }
     }
   }
