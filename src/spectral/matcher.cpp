@@ -131,7 +131,7 @@ std::size_t Matcher::lines_of(Stage stage) const {
     case Stage::surface_rows:
       return side;
     case Stage::blur_edges:
-      return side + 4 * std::size_t{margin_};
+      return EdgeBlur::lines(config_.side, margin_);
     case Stage::picture_columns:
     case Stage::whiten:
     case Stage::turned_columns:
