@@ -106,8 +106,8 @@ Submap render(const std::vector<Scan>& scans, std::size_t first, double turn) {
       const int steps = static_cast<int>(range / (0.5 * kCell));
       for (int s = 0; s <= steps; ++s) {
         const double r = s == steps ? range : s * 0.5 * kCell;
-        const double column = std::floor((laser.x + r * std::cos(angle)) / kCell) + kGridSide / 2;
-        const double row = std::floor((laser.y + r * std::sin(angle)) / kCell) + kGridSide / 2;
+        const double column = std::floor((laser.x + r * std::cos(angle)) / kCell) + 0.5 * kGridSide;
+        const double row = std::floor((laser.y + r * std::sin(angle)) / kCell) + 0.5 * kGridSide;
         if (column < 0 || column >= kGridSide || row < 0 || row >= kGridSide) {
           break;
         }

@@ -2,9 +2,7 @@
 
 #include <doctest.h>
 
-#include <array>
 #include <cmath>
-#include <cstring>
 #include <initializer_list>
 #include <utility>
 #include <vector>
@@ -156,9 +154,9 @@ Picture golden_picture(const std::uint8_t (&bytes)[48 * 48]) { return {bytes, by
 /// `picture` moved by whole pixels; what leaves the frame is lost.
 Picture moved(const Picture& picture, std::size_t side, int dx, int dy) {
   Picture out(picture.size(), 0);
-  const int n = static_cast<int>(side);
-  for (int r = 0; r < n; ++r) {
-    for (int c = 0; c < n; ++c) {
+  const auto n = static_cast<std::ptrdiff_t>(side);
+  for (std::ptrdiff_t r = 0; r < n; ++r) {
+    for (std::ptrdiff_t c = 0; c < n; ++c) {
       if (c - dx >= 0 && c - dx < n && r - dy >= 0 && r - dy < n) {
         out[static_cast<std::size_t>(r * n + c)] = picture[static_cast<std::size_t>((r - dy) * n + c - dx)];
       }
@@ -204,8 +202,8 @@ bool same_bits(const HypothesisList& a, const HypothesisList& b) {
     return false;
   }
   for (std::size_t i = 0; i < a.size(); ++i) {
-    if (std::memcmp(&a[i].a_T_b, &b[i].a_T_b, sizeof(Pose2)) != 0 || a[i].peak != b[i].peak ||
-        a[i].rotation_peak != b[i].rotation_peak) {
+    if (a[i].a_T_b.x != b[i].a_T_b.x || a[i].a_T_b.y != b[i].a_T_b.y || a[i].a_T_b.theta != b[i].a_T_b.theta ||
+        a[i].peak != b[i].peak || a[i].rotation_peak != b[i].rotation_peak) {
       return false;
     }
   }
@@ -410,8 +408,9 @@ TEST_SUITE("matcher") {
     const auto draw = [&](auto inside) {
       Picture picture(side * side);
       for (std::size_t i = 0; i < picture.size(); ++i) {
+        const std::size_t row = i / side;
         const double x = static_cast<double>(i % side) - 23.5;
-        const double y = static_cast<double>(i / side) - 23.5;
+        const double y = static_cast<double>(row) - 23.5;
         picture[i] = inside(x, y) ? 255 : 0;
       }
       pictures.push_back(picture);
