@@ -2,6 +2,7 @@
 
 #include <doctest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <initializer_list>
@@ -15,6 +16,11 @@ using namespace mellin;
 // KissFFT's own, to compare what its plans ask for (its header is not the tests' business).
 extern "C" void* kiss_fft_alloc(int n, int inverse, void* memory, std::size_t* bytes);
 extern "C" void* kiss_fftr_alloc(int n, int inverse, void* memory, std::size_t* bytes);
+extern "C" void kiss_fft(void* plan, const void* in, void* out);
+#if MELLIN_FFT_LANES == 4
+extern "C" void* mellin_lanes_fft_alloc(int n, int inverse, void* memory, std::size_t* bytes);
+extern "C" void* mellin_lanes_fftr_alloc(int n, int inverse, void* memory, std::size_t* bytes);
+#endif
 
 namespace {
 
@@ -79,6 +85,14 @@ TEST_SUITE("fft2") {
         bytes = 0;
         kiss_fftr_alloc(static_cast<int>(side), inverse, nullptr, &bytes);
         CHECK(bytes == real_plan_bytes(side));
+#if MELLIN_FFT_LANES == 4
+        bytes = 0;
+        mellin_lanes_fft_alloc(static_cast<int>(side), inverse, nullptr, &bytes);
+        CHECK(bytes == complex_plan_bytes(side, kFftLanes));
+        bytes = 0;
+        mellin_lanes_fftr_alloc(static_cast<int>(side), inverse, nullptr, &bytes);
+        CHECK(bytes == real_plan_bytes(side, kFftLanes));
+#endif
       }
     }
   }
@@ -96,7 +110,9 @@ TEST_SUITE("fft2") {
       for (const auto& spot : spots) {
         const std::complex<double> expected = coefficient(image, side, spot[0], spot[1]);
         const Complex actual = spectrum[spot[0] * side + spot[1]];
-        CHECK(std::abs(expected - std::complex<double>(actual.re, actual.im)) < 2e-6 * side * side);
+        CHECK(
+            std::abs(expected - std::complex<double>(static_cast<double>(actual.re), static_cast<double>(actual.im))) <
+            2e-6 * static_cast<double>(side) * side);
       }
     }
   }
@@ -141,6 +157,47 @@ TEST_SUITE("fft2") {
     }
   }
 
+  TEST_CASE("lanes give the bits of the plain transform, and back") {
+    for (const std::uint16_t side : std::initializer_list<std::uint16_t>{32, 50, 54, 96, 384}) {
+      CAPTURE(side);
+      Transform transform(side);
+      const std::vector<float> image = noise(side);
+      const std::size_t width = side / 2U + 1U;
+      std::vector<Complex> spectrum(spectrum_size(side));
+      std::vector<float> rows(Fft2::kBlock * side);
+      std::vector<Complex> line(side);
+      std::vector<float> back(side);
+      std::vector<double> plan(complex_plan_bytes(side) / sizeof(double) + 1);
+      std::size_t bytes = plan.size() * sizeof(double);
+      REQUIRE(kiss_fft_alloc(side, 0, plan.data(), &bytes) != nullptr);
+      for (const std::size_t count : {std::size_t{8}, std::size_t{4}, std::size_t{3}}) {
+        transform.fft.forward_rows(image.data(), 2, count, {spectrum.data(), spectrum.size()});
+        transform.fft.inverse_rows({spectrum.data(), spectrum.size()}, 2, count, rows.data());
+        for (std::size_t r = 0; r < count; ++r) {
+          transform.fft.forward_line(image.data() + r * side, line.data());
+          transform.fft.inverse_line(line.data(), back.data());
+          for (std::size_t k = 0; k < width; ++k) {
+            REQUIRE(spectrum[k * side + 2 + r].re == line[k].re);
+            REQUIRE(spectrum[k * side + 2 + r].im == line[k].im);
+          }
+          REQUIRE(std::equal(back.begin(), back.end(), rows.begin() + static_cast<std::ptrdiff_t>(r * side)));
+        }
+      }
+      for (std::size_t i = 0; i < spectrum.size(); ++i) {
+        spectrum[i] = {image[i], image[image.size() - 1 - i]};
+      }
+      const std::vector<Complex> before = spectrum;
+      transform.fft.forward_columns({spectrum.data(), spectrum.size()}, 0, width);
+      for (std::size_t kx = 0; kx < width; ++kx) {
+        kiss_fft(plan.data(), before.data() + kx * side, line.data());
+        for (std::size_t k = 0; k < side; ++k) {
+          REQUIRE(spectrum[kx * side + k].re == line[k].re);
+          REQUIRE(spectrum[kx * side + k].im == line[k].im);
+        }
+      }
+    }
+  }
+
   TEST_CASE("a wrong side and too little memory are refused") {
     Transform transform(96);
     MeasureArena measure;
@@ -149,6 +206,6 @@ TEST_SUITE("fft2") {
     CHECK(fft.init(96, {}) == Status::insufficient_memory);
     std::vector<double> memory(transform.bytes / sizeof(double));
     Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(memory.data()), transform.bytes));
-    CHECK(fft.init(108, Fft2::carve(arena, 96)) == Status::insufficient_memory);
+    CHECK(fft.init(128, Fft2::carve(arena, 96)) == Status::insufficient_memory);
   }
 }

@@ -113,7 +113,7 @@ TEST_SUITE("image") {
     REQUIRE(edges.begin(image.view(), 4, {scratch.data(), scratch.size()}) == Status::ok);
     CHECK(edges.step(1000));
     for (const float pixel : image.pixels) {
-      REQUIRE(pixel == doctest::Approx(0.75).epsilon(1e-6));
+      REQUIRE(static_cast<double>(pixel) == doctest::Approx(0.75).epsilon(1e-6));
     }
     for (std::size_t i = 0; i < image.pixels.size(); ++i) {
       image.pixels[i] = i % 32 < 16 ? 0.0F : 1.0F;
@@ -145,7 +145,8 @@ TEST_SUITE("image") {
     REQUIRE(halve(thick.view(), expected.view()) == Status::ok);
     REQUIRE(thicken_and_halve(noise.view(), {{noise.pixels.data(), 64}, 8}, 0, 8) == Status::ok);
     for (std::size_t i = 0; i < 64; ++i) {
-      CHECK(noise.pixels[i] == doctest::Approx(expected.pixels[i]).epsilon(1e-6));
+      CHECK(static_cast<double>(noise.pixels[i]) ==
+            doctest::Approx(static_cast<double>(expected.pixels[i])).epsilon(1e-6));
     }
   }
 

@@ -29,16 +29,19 @@ std::size_t mirrored_above(std::size_t i, std::size_t offset, std::size_t side) 
   return i + offset < side ? i + offset : 2 * (side - 1) - (i + offset);
 }
 
-/// out = `line` (side pixels) under the kernel, cyclically.
-void convolve_cyclic(const float* line, std::size_t side, Span<const float> kernel, float* out) {
-  for (std::size_t i = 0; i < side; ++i) {
-    float sum = kernel[0] * line[i];
-    for (std::size_t k = 1; k < kernel.size(); ++k) {
-      const std::size_t before = i >= k ? i - k : i + side - k;
-      const std::size_t behind = i + k < side ? i + k : i + k - side;
-      sum += kernel[k] * (line[before] + line[behind]);
+/// out[i] = the `size` elements from padded[radius] on, each under the kernel; kernel: one half, centre first.
+void convolve(const float* padded, std::size_t size, Span<const float> kernel, float* out) {
+  const std::size_t radius = kernel.size() - 1;
+  for (std::size_t i = 0; i < size; ++i) {
+    out[i] = kernel[0] * padded[i + radius];
+  }
+  for (std::size_t k = 1; k <= radius; ++k) {
+    const float* const before = padded + radius - k;
+    const float* const behind = padded + radius + k;
+    const float weight = kernel[k];
+    for (std::size_t i = 0; i < size; ++i) {
+      out[i] += weight * (before[i] + behind[i]);
     }
-    out[i] = sum;
   }
 }
 
@@ -171,64 +174,82 @@ Status EdgeBlur::begin(const ImageView& image, std::uint16_t margin_pixels, Span
   margin_ = margin_pixels;
   next_ = 0;
   const std::size_t band = 2 * margin_ * image.side;
+  const std::size_t line = image.side + 4 * margin_;
   rows_ = scratch.first(band);
   columns_ = scratch.subspan(band, band);
-  line_ = scratch.subspan(2 * band, image.side);
-  kernel_ = scratch.subspan(2 * band + image.side, 2 * margin_ + 1);
+  line_ = scratch.subspan(2 * band, line);
+  kernel_ = scratch.subspan(2 * band + line, 2 * margin_ + 1);
   gaussian_kernel(static_cast<double>(margin_) / 2.0, kernel_);
   return Status::ok;
 }
 
-bool EdgeBlur::step(std::size_t lines) {
+bool EdgeBlur::step(std::size_t count) {
   const std::size_t band = 2 * margin_;
-  const std::size_t all = 2 * band + image_.side;
-  for (std::size_t i = 0; i < lines && next_ < all && image_.side > 0; ++i, ++next_) {
+  const std::size_t side = image_.side;
+  const std::size_t all = band + 2 * side;
+  for (std::size_t i = 0; i < count && next_ < all && side > 0; ++i, ++next_) {
     if (next_ < band) {
-      blur_row(next_);
-    } else if (next_ < 2 * band) {
-      blur_column(next_ - band);
+      blur_band_row(next_);
+    } else if (next_ < band + side) {
+      blur_across_columns(next_ - band);
     } else {
-      blend_row(next_ - 2 * band);
+      blend_row(next_ - band - side);
     }
   }
-  return image_.side == 0 || next_ == all;
+  return side == 0 || next_ == all;
 }
 
-/// The band lies across the seam of the periodic picture: its first half ends at the last row, its second begins at 0.
-void EdgeBlur::blur_row(std::size_t band_row) {
+/// A row of the upper and lower band, both ways.
+void EdgeBlur::blur_band_row(std::size_t band_row) {
   const std::size_t side = image_.side;
+  const std::size_t radius = 2 * margin_;
   const std::size_t centre = (side - margin_ + band_row) % side;
+  float* const down = line_.data() + radius;
   const float* const middle = image_.row(centre);
   for (std::size_t c = 0; c < side; ++c) {
-    line_[c] = kernel_[0] * middle[c];
+    down[c] = kernel_[0] * middle[c];
   }
-  for (std::size_t k = 1; k < kernel_.size(); ++k) {
+  for (std::size_t k = 1; k <= radius; ++k) {
     const float* const before = image_.row((centre + side - k) % side);
     const float* const behind = image_.row((centre + k) % side);
     const float weight = kernel_[k];
     for (std::size_t c = 0; c < side; ++c) {
-      line_[c] += weight * (before[c] + behind[c]);
+      down[c] += weight * (before[c] + behind[c]);
     }
   }
-  convolve_cyclic(line_.data(), side, kernel_, rows_.data() + band_row * side);
+  std::copy(down + side - radius, down + side, line_.data());
+  std::copy(down, down + radius, down + side);
+  convolve(line_.data(), side, kernel_, rows_.data() + band_row * side);
 }
 
-void EdgeBlur::blur_column(std::size_t band_column) {
+/// A row's piece in the left and right band, along the row; the other way follows in blend_row().
+void EdgeBlur::blur_across_columns(std::size_t r) {
+  const float* const row = image_.row(r);
+  const std::size_t reach = 3 * margin_;
+  std::copy(row + image_.side - reach, row + image_.side, line_.data());
+  std::copy(row, row + reach, line_.data() + reach);
+  convolve(line_.data(), 2 * margin_, kernel_, columns_.data() + r * 2 * margin_);
+}
+
+/// A row's piece in the left and right band, blurred both ways, at the start of the line's memory.
+void EdgeBlur::blur_down_columns(std::size_t r) {
   const std::size_t side = image_.side;
-  const std::size_t centre = (side - margin_ + band_column) % side;
-  for (std::size_t r = 0; r < side; ++r) {
-    const float* const row = image_.row(r);
-    float sum = kernel_[0] * row[centre];
-    for (std::size_t k = 1; k < kernel_.size(); ++k) {
-      const std::size_t before = centre >= k ? centre - k : centre + side - k;
-      const std::size_t behind = centre + k < side ? centre + k : centre + k - side;
-      sum += kernel_[k] * (row[before] + row[behind]);
-    }
-    line_[r] = sum;
+  const std::size_t width = 2 * margin_;
+  float* const out = line_.data();
+  for (std::size_t c = 0; c < width; ++c) {
+    out[c] = kernel_[0] * columns_[r * width + c];
   }
-  convolve_cyclic(line_.data(), side, kernel_, columns_.data() + band_column * side);
+  for (std::size_t k = 1; k < kernel_.size(); ++k) {
+    const float* const before = columns_.data() + (r + side - k) % side * width;
+    const float* const behind = columns_.data() + (r + k) % side * width;
+    const float weight = kernel_[k];
+    for (std::size_t c = 0; c < width; ++c) {
+      out[c] += weight * (before[c] + behind[c]);
+    }
+  }
 }
 
+/// The bands lie across the seams of the periodic picture: their first halves end at the last row or column.
 void EdgeBlur::blend_row(std::size_t r) {
   const std::size_t side = image_.side;
   float* const row = image_.row(r);
@@ -245,10 +266,11 @@ void EdgeBlur::blend_row(std::size_t r) {
     }
     return;
   }
+  blur_down_columns(r);
   for (std::size_t i = 0; i < margin_; ++i) {
     const float keep = share(i);
     for (const std::size_t c : {i, side - 1 - i}) {
-      row[c] = keep * row[c] + (1.0F - keep) * columns_[band_index(c) * side + r];
+      row[c] = keep * row[c] + (1.0F - keep) * line_[band_index(c)];
     }
   }
 }

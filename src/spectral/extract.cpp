@@ -1,5 +1,6 @@
 // The passes that make a picture's features.
 #include <algorithm>
+#include <cmath>
 
 #include "mellin/spectral/matcher.hpp"
 #include "spectral/resample.hpp"
@@ -13,7 +14,7 @@ Span<float> as_floats(Span<Complex> memory) {
   return Span<float>(reinterpret_cast<float*>(memory.data()), 2 * memory.size());
 }
 
-float magnitude(Complex z) { return sqrt(z.re * z.re + z.im * z.im); }
+float magnitude(Complex z) { return std::sqrt(z.re * z.re + z.im * z.im); }
 
 }  // namespace
 
@@ -67,7 +68,7 @@ void Matcher::transform_picture_columns(std::size_t first, std::size_t count) {
       const auto fx = static_cast<float>(kx);
       for (std::size_t i = 0; i < side; ++i) {
         const auto fy = static_cast<float>(std::min(i, side - i));
-        weighted[i] *= sqrt(fx * fx + fy * fy);
+        weighted[i] *= std::sqrt(fx * fx + fy * fy);
       }
     }
   }

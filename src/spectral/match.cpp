@@ -116,22 +116,23 @@ void Matcher::transform_turned_rows(std::size_t first, std::size_t count) {
   }
 }
 
-/// A column at a time through the fast memory: forward, whitened, multiplied with the filter of a, and back. The
+/// A few columns at a time through the fast memory: forward, whitened, multiplied with the filter of a, and back. The
 /// picture turned by a further 180 degrees has the conjugate spectrum (but for a shift, see locate_peak()), so both
 /// candidates come from one.
 void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
-  Complex* const column = memory_.lines.data();
-  Complex* const straight = column + side;
-  Complex* const half_turned = straight + side;
+  Complex* const turned = memory_.lines.data();
+  Complex* const straight = turned + kFftLanes * side;
+  Complex* const half_turned = straight + kFftLanes * side;
   const float floor = b_.floor;
-  for (std::size_t kx = first; kx < first + count; ++kx) {
-    Complex* const line = memory_.first.data() + kx * side;
+  for (std::size_t kx = first; kx < first + count; kx += kFftLanes) {
+    const std::size_t columns = std::min(kFftLanes, first + count - kx);
+    Complex* const lines = memory_.first.data() + kx * side;
     const Complex* const filter = a_.filter.data() + kx * side;
-    fft_.forward_column(line, column);
-    for (std::size_t i = 0; i < side; ++i) {
-      const Complex z = column[i];
-      const float weight = 1.0F / (sqrt(z.re * z.re + z.im * z.im) + floor);
+    fft_.forward_lines(lines, columns, turned);
+    for (std::size_t i = 0; i < columns * side; ++i) {
+      const Complex z = turned[i];
+      const float weight = 1.0F / (std::sqrt(z.re * z.re + z.im * z.im) + floor);
       const float re = weight * z.re;
       const float im = weight * z.im;
       const float rr = filter[i].re * re;
@@ -141,8 +142,8 @@ void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
       straight[i] = {rr + ii, ir - ri};
       half_turned[i] = {rr - ii, ir + ri};
     }
-    fft_.inverse_column(straight, line);
-    fft_.inverse_column(half_turned, memory_.second.data() + kx * side);
+    fft_.inverse_lines(straight, columns, lines);
+    fft_.inverse_lines(half_turned, columns, memory_.second.data() + kx * side);
   }
 }
 

@@ -42,7 +42,7 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
   const std::size_t side = config.side;
   const bool enough = memory.first.size() == spectrum_size(config.side) &&
                       memory.second.size() == memory.first.size() && memory.rows.size() == Fft2::kBlock * side &&
-                      memory.lines.size() == 3 * side && memory.directions.size() == side &&
+                      memory.lines.size() == 3 * kFftLanes * side && memory.directions.size() == side &&
                       memory.lowpass.size() == side && memory.correlation.size() == side;
   if (!enough) {
     return Status::insufficient_memory;
@@ -131,7 +131,7 @@ std::size_t Matcher::lines_of(Stage stage) const {
     case Stage::surface_rows:
       return side;
     case Stage::blur_edges:
-      return side + 4 * std::size_t{margin_};
+      return EdgeBlur::lines(config_.side, margin_);
     case Stage::picture_columns:
     case Stage::whiten:
     case Stage::turned_columns:

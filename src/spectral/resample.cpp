@@ -8,11 +8,44 @@ namespace {
 
 float mix(float a, float b, float share) { return a + share * (b - a); }
 
+/// Along a row of the turned picture: where each pixel comes from. Coordinates are larger by 1, so that truncation
+/// rounds down as far as the ring of zeros round the picture. Each coordinate is monotone in the column, rounding
+/// included: the pixels that come from inside the picture are one run.
+struct TurnedRow {
+  float x_of_centre;
+  float y_of_centre;
+  float cos;
+  float sin;
+  float centre;
+  float side;
+
+  float x(std::size_t column) const { return x_of_centre + cos * (static_cast<float>(column) - centre); }
+  float y(std::size_t column) const { return y_of_centre - sin * (static_cast<float>(column) - centre); }
+  /// All four pixels around it are pixels of the picture.
+  bool inside(std::size_t column) const {
+    return x(column) >= 1.0F && x(column) < side && y(column) >= 1.0F && y(column) < side;
+  }
+};
+
 /// A pixel, or 0 beyond the border.
 float pixel_or_zero(const ImageView& image, int column, int row) {
   const int side = image.side;
   const bool inside = column >= 0 && column < side && row >= 0 && row < side;
   return inside ? image.at(static_cast<std::size_t>(column), static_cast<std::size_t>(row)) : 0.0F;
+}
+
+/// The picture at (x, y), anywhere.
+float sample_near_border(const ImageView& image, float x, float y) {
+  const float end = static_cast<float>(image.side + 1);
+  if (!(x > 0.0F && x < end && y > 0.0F && y < end)) {
+    return 0.0F;
+  }
+  const int column = static_cast<int>(x) - 1;
+  const int row = static_cast<int>(y) - 1;
+  const float share_x = x - static_cast<float>(column + 1);
+  const float lower = mix(pixel_or_zero(image, column, row), pixel_or_zero(image, column + 1, row), share_x);
+  const float upper = mix(pixel_or_zero(image, column, row + 1), pixel_or_zero(image, column + 1, row + 1), share_x);
+  return mix(lower, upper, y - static_cast<float>(row + 1));
 }
 
 }  // namespace
@@ -21,33 +54,27 @@ void turned_row(const ImageView& image, SinCosF turn, std::size_t row, float* ou
   const int side = image.side;
   const float centre = 0.5F * static_cast<float>(side - 1);
   const float dy = static_cast<float>(row) - centre;
-  // Where the pixel comes from, plus 1 so that truncation rounds down as far as the ring of zeros round the picture.
-  const float x_of_centre = centre + 1.0F + turn.sin * dy;
-  const float y_of_centre = centre + 1.0F + turn.cos * dy;
-  const float end = static_cast<float>(side + 1);
+  const TurnedRow from{centre + 1.0F + turn.sin * dy, centre + 1.0F + turn.cos * dy, turn.cos, turn.sin, centre,
+                       static_cast<float>(side)};
+  std::size_t begin = 0;
+  std::size_t end = image.side;
+  for (; begin < end && !from.inside(begin); ++begin) {
+    out[begin] = sample_near_border(image, from.x(begin), from.y(begin));
+  }
+  for (; end > begin && !from.inside(end - 1); --end) {
+    out[end - 1] = sample_near_border(image, from.x(end - 1), from.y(end - 1));
+  }
   const float* const pixels = image.pixels.data();
-  for (int c = 0; c < side; ++c) {
-    const float dx = static_cast<float>(c) - centre;
-    const float x = x_of_centre + turn.cos * dx;
-    const float y = y_of_centre - turn.sin * dx;
-    if (!(x > 0.0F && x < end && y > 0.0F && y < end)) {
-      out[c] = 0.0F;
-      continue;
-    }
-    const int column = static_cast<int>(x) - 1;
-    const int line = static_cast<int>(y) - 1;
-    const float share_x = x - static_cast<float>(column + 1);
-    const float share_y = y - static_cast<float>(line + 1);
-    if (column >= 0 && column < side - 1 && line >= 0 && line < side - 1) {
-      const float* const lower = pixels + static_cast<std::ptrdiff_t>(line) * side + column;
-      const float* const upper = lower + side;
-      out[c] = mix(mix(lower[0], lower[1], share_x), mix(upper[0], upper[1], share_x), share_y);
-    } else {
-      const float lower = mix(pixel_or_zero(image, column, line), pixel_or_zero(image, column + 1, line), share_x);
-      const float upper =
-          mix(pixel_or_zero(image, column, line + 1), pixel_or_zero(image, column + 1, line + 1), share_x);
-      out[c] = mix(lower, upper, share_y);
-    }
+  for (std::size_t c = begin; c < end; ++c) {
+    const float x = from.x(c);
+    const float y = from.y(c);
+    const int column = static_cast<int>(x);
+    const int line = static_cast<int>(y);
+    const float share_x = x - static_cast<float>(column);
+    const float share_y = y - static_cast<float>(line);
+    const float* const lower = pixels + ((line - 1) * side + column - 1);
+    const float* const upper = lower + side;
+    out[c] = mix(mix(lower[0], lower[1], share_x), mix(upper[0], upper[1], share_x), share_y);
   }
 }
 

@@ -61,29 +61,34 @@ class EdgeBlur {
     const auto most = static_cast<std::uint16_t>(side / 4);
     return wanted < 2 ? std::uint16_t{2} : (wanted > most ? most : wanted);
   }
-  /// Floats that begin() needs: two blurred bands, a line, the kernel. Below side * side for sides from 32 on and
-  /// margins up to a tenth.
+  /// Floats that begin() needs: two blurred bands, a line with its surroundings, the kernel. Below side * side for
+  /// sides from 32 on and margins up to a tenth.
   static constexpr std::size_t scratch_size(std::uint16_t side, std::uint16_t margin_pixels) {
     const std::size_t band = std::size_t{2} * margin_pixels * side;
-    return 2 * band + side + 2 * std::size_t{margin_pixels} + 1;
+    return 2 * band + side + std::size_t{6} * margin_pixels + 1;
+  }
+  /// Lines of work in all, for step().
+  static constexpr std::size_t lines(std::uint16_t side, std::uint16_t margin_pixels) {
+    return std::size_t{2} * margin_pixels + std::size_t{2} * side;
   }
 
   /// Starts on `image`, which step() changes in place; both spans must live until it is done.
   /// invalid_argument: image inconsistent, margin of 0 or over side / 4, scratch too small.
   Status begin(const ImageView& image, std::uint16_t margin_pixels, Span<float> scratch);
-  /// Treats up to `lines` lines (each at most side * (4 margin + 1) multiplications, twice); true when done.
-  bool step(std::size_t lines);
+  /// Treats up to `count` lines (each at most 2 side * (2 margin + 1) multiplications); true when done.
+  bool step(std::size_t count);
 
  private:
-  void blur_row(std::size_t band_row);
-  void blur_column(std::size_t band_column);
+  void blur_band_row(std::size_t band_row);
+  void blur_across_columns(std::size_t row);
+  void blur_down_columns(std::size_t row);
   void blend_row(std::size_t row);
 
   ImageView image_;
   std::size_t margin_ = 0;
-  std::size_t next_ = 0;  // lines done: rows of the band, columns of the band, rows blended
-  Span<float> rows_;      // 2 margin rows of `side`: rows side - margin … side - 1, 0 … margin - 1
-  Span<float> columns_;   // 2 margin columns of `side`, each contiguous
+  std::size_t next_ = 0;  // lines done: rows of the band, rows across the columns' band, rows blended
+  Span<float> rows_;      // rows side - margin … side - 1, 0 … margin - 1, blurred
+  Span<float> columns_;   // of each row the columns side - margin … side - 1, 0 … margin - 1, blurred along the row
   Span<float> line_;
   Span<float> kernel_;  // one half, from the centre on
 };

@@ -12,6 +12,7 @@
 #include "mellin/core/arena.hpp"
 #include "mellin/core/span.hpp"
 #include "mellin/core/status.hpp"
+#include "mellin/spectral/fft_lanes.h"
 
 namespace mellin {
 
@@ -36,37 +37,50 @@ constexpr bool is_fft_side(std::uint32_t side) {
 /// Coefficients in the spectrum of an image.
 constexpr std::size_t spectrum_size(std::uint16_t side) { return std::size_t{side} * (side / 2U + 1U); }
 
-/// Bytes of KissFFT's plan for `n` complex points: its state (66 ints) and n twiddle factors.
-constexpr std::size_t complex_plan_bytes(std::size_t n) { return 66 * sizeof(int) + n * sizeof(Complex); }
-/// Bytes of KissFFT's plan for `n` real points: three pointers, the plan for n / 2 complex ones, n / 2 of buffer and
-/// n / 4 twiddle factors.
-constexpr std::size_t real_plan_bytes(std::size_t n) {
-  return 3 * sizeof(void*) + complex_plan_bytes(n / 2) + (n / 2 * 3 / 2) * sizeof(Complex);
+/// Transforms that run side by side.
+inline constexpr std::size_t kFftLanes = MELLIN_FFT_LANES;
+
+/// Bytes of KissFFT's plan for `n` complex points: its state (66 ints) and n twiddle factors, one a lane.
+constexpr std::size_t complex_plan_bytes(std::size_t n, std::size_t lanes = 1) {
+  return 66 * sizeof(int) + n * lanes * sizeof(Complex);
+}
+/// Bytes of KissFFT's plan for `n` real points: three pointers (and one of padding with lanes), the plan for n / 2
+/// complex ones, n / 2 of buffer and n / 4 twiddle factors.
+constexpr std::size_t real_plan_bytes(std::size_t n, std::size_t lanes = 1) {
+  return (lanes > 1 ? 4 : 3) * sizeof(void*) + complex_plan_bytes(n / 2, lanes) +
+         (n / 2 * 3 / 2) * lanes * sizeof(Complex);
 }
 
 class Fft2 {
  public:
-  /// Rows that are transformed together, so that the transposed spectrum is touched by whole cache lines.
+  /// Rows that are transformed together at most, so that the transposed spectrum is touched by whole cache lines.
   static constexpr std::size_t kBlock = 8;
 
   struct Memory {
-    Span<std::byte> real_forward;
-    Span<std::byte> real_inverse;
-    Span<std::byte> complex_forward;
-    Span<std::byte> complex_inverse;
-    Span<Complex> block;  ///< kBlock rows of a spectrum
-    Span<Complex> line;   ///< a column of a spectrum
+    Span<std::byte> line_forward;  ///< plans for one line of real numbers …
+    Span<std::byte> line_inverse;
+    Span<std::byte> rows_forward;  ///< … for kFftLanes of them (none where that is 1) …
+    Span<std::byte> rows_inverse;
+    Span<std::byte> columns_forward;  ///< … and for kFftLanes lines of complex ones
+    Span<std::byte> columns_inverse;
+    Span<Complex> in;  ///< kBlock row spectra, or kFftLanes columns
+    Span<Complex> out;
   };
 
   template <class A>
   static constexpr Memory carve(A& arena, std::uint16_t side) {
+    const std::size_t rows_bytes = kFftLanes > 1 ? real_plan_bytes(side, kFftLanes) : 0;
+    const std::size_t columns_bytes = complex_plan_bytes(side, kFftLanes);
+    const std::size_t block = kFftLanes > 1 ? kFftLanes * side : kBlock * (side / 2U + 1U);
     Memory m;
-    m.real_forward = arena.template take<std::byte>(real_plan_bytes(side), Part::spectral, Region::fast);
-    m.real_inverse = arena.template take<std::byte>(real_plan_bytes(side), Part::spectral, Region::fast);
-    m.complex_forward = arena.template take<std::byte>(complex_plan_bytes(side), Part::spectral, Region::fast);
-    m.complex_inverse = arena.template take<std::byte>(complex_plan_bytes(side), Part::spectral, Region::fast);
-    m.block = arena.template take<Complex>(kBlock * (side / 2U + 1U), Part::spectral, Region::fast);
-    m.line = arena.template take<Complex>(side, Part::spectral, Region::fast);
+    m.line_forward = arena.template take<std::byte>(real_plan_bytes(side), Part::spectral, Region::fast);
+    m.line_inverse = arena.template take<std::byte>(real_plan_bytes(side), Part::spectral, Region::fast);
+    m.rows_forward = arena.template take<std::byte>(rows_bytes, Part::spectral, Region::fast);
+    m.rows_inverse = arena.template take<std::byte>(rows_bytes, Part::spectral, Region::fast);
+    m.columns_forward = arena.template take<std::byte>(columns_bytes, Part::spectral, Region::fast);
+    m.columns_inverse = arena.template take<std::byte>(columns_bytes, Part::spectral, Region::fast);
+    m.in = arena.template take<Complex>(block, Part::spectral, Region::fast);
+    m.out = arena.template take<Complex>(kFftLanes > 1 ? block : side, Part::spectral, Region::fast);
     return m;
   }
 
@@ -83,9 +97,9 @@ class Fft2 {
   /// Image rows [first, first + count), count <= kBlock, of a spectrum whose columns are all back; `rows` contiguous.
   void inverse_rows(Span<const Complex> spectrum, std::size_t first, std::size_t count, float* rows);
 
-  /// One column: `in` and `out` have side elements each and do not overlap.
-  void forward_column(const Complex* in, Complex* out) const;
-  void inverse_column(const Complex* in, Complex* out) const;
+  /// `count` <= kFftLanes columns, contiguous in `in` and `out`, which do not overlap.
+  void forward_lines(const Complex* in, std::size_t count, Complex* out);
+  void inverse_lines(const Complex* in, std::size_t count, Complex* out);
   /// One line of `side` real numbers to its side / 2 + 1 coefficients, and back; no overlap.
   void forward_line(const float* in, Complex* out) const;
   void inverse_line(const Complex* in, float* out) const;

@@ -31,14 +31,15 @@ struct MatcherConfig {
   /// Side of the pictures, pixels: is_fft_side(). The angular resolution is 180 degrees / side, refined by the centre
   /// of mass.
   std::uint16_t side = 96;
-  /// Edge of a pixel, m: gives the hypotheses their unit.
-  float pixel_m = 0.4F;
-  /// Rotation peaks of at least this share of the strongest are tried (IV-B3; the paper says 0.9), 0 … 1.
-  float peak_share = 0.5F;
-  /// At most so many of them, strongest first (IV-B3): 1 … 6. Time is in proportion; each gives two hypotheses.
+  /// At most so many rotation peaks are tried, strongest first (IV-B3): 1 … 6. Time is in proportion; each gives two
+  /// hypotheses.
   std::uint8_t max_peaks = 6;
   /// Radius of the neighbourhood whose centre of mass is the peak's position (Eq. 3, CoM_r): 0 … 3 pixels.
   std::uint8_t com_radius = 1;
+  /// Edge of a pixel, m: gives the hypotheses their unit.
+  float pixel_m = 0.4F;
+  /// Rotation peaks of at least this share of the strongest count (IV-B3; the paper says 0.9), 0 … 1.
+  float peak_share = 0.5F;
   /// Standard deviation of the Gaussian low-pass in the phase-only filter, cycles per pixel; 0 leaves it out (pure
   /// phase correlation, IV-A step 3).
   float lowpass_sigma = 0.25F;
@@ -119,7 +120,7 @@ class Matcher {
     Span<Complex> first;       ///< a spectrum
     Span<Complex> second;      ///< a spectrum; scratch memory of extract()
     Span<float> rows;          ///< Fft2::kBlock rows of an image
-    Span<Complex> lines;       ///< three columns of a spectrum
+    Span<Complex> lines;       ///< three times kFftLanes columns of a spectrum
     Span<Complex> directions;  ///< cosine and sine of each angle
     Span<float> lowpass;       ///< along one axis
     Span<float> correlation;   ///< over the angles
@@ -133,7 +134,7 @@ class Matcher {
     m.first = arena.template take<Complex>(spectrum_size(config.side), Part::spectral);
     m.second = arena.template take<Complex>(spectrum_size(config.side), Part::spectral);
     m.rows = arena.template take<float>(Fft2::kBlock * side, Part::spectral, Region::fast);
-    m.lines = arena.template take<Complex>(3 * side, Part::spectral, Region::fast);
+    m.lines = arena.template take<Complex>(3 * kFftLanes * side, Part::spectral, Region::fast);
     m.directions = arena.template take<Complex>(side, Part::spectral);
     m.lowpass = arena.template take<float>(side, Part::spectral, Region::fast);
     m.correlation = arena.template take<float>(side, Part::spectral);
