@@ -21,7 +21,8 @@ struct Arguments {
 
 void run(const Arguments& arguments) {
   OptimiserOptions options = arguments.options;
-  options.start = arguments.from_file ? Start::current : Start::chordal;
+  // False edges bend the chordal start, and the robust kernel with it.
+  options.start = arguments.from_file || options.robust ? Start::current : Start::chordal;
   host::G2oGraph graph = host::read_g2o(arguments.in);
   const host::GraphRun run = host::optimise_graph(graph, options, arguments.max_fill);
   host::write_g2o(arguments.out, graph);
@@ -49,7 +50,8 @@ void add_optimize(CLI::App& app) {
   command->add_option("-o,--output", arguments->out, "graph to write, g2o")->required();
   command->add_flag("--robust", arguments->options.robust, "robust kernel on edges between non-consecutive vertices");
   command->add_option("--robust-chi2", arguments->options.robust_chi2, "chi2 beyond which an edge is an outlier");
-  command->add_flag("--from-file", arguments->from_file, "start from the vertices instead of the chordal start");
+  command->add_flag("--from-file", arguments->from_file,
+                    "start from the vertices instead of the chordal start (implied by --robust)");
   command->add_option("--max-iterations", arguments->options.max_iterations, "linear solves at most");
   command->add_option("--tolerance", arguments->options.tolerance, "relative decrease of chi2 that ends the iteration");
   command->add_option("--max-fill", arguments->max_fill, "blocks of the Cholesky factor; 0: as many as it needs");
