@@ -139,8 +139,9 @@ void MapPicture::add(const GridView& grid, const Pose2& map_T_submap) {
       float sum = 0.0F;
       int count = 0;
       for (int i = 0; i < samples * samples; ++i) {
+        const int down = i / samples;
         const double x = (static_cast<double>(column) + (i % samples + 0.5) / samples) * options_.cell_m + origin_x_;
-        const double y = (static_cast<double>(row) + (i / samples + 0.5) / samples) * options_.cell_m + origin_y_;
+        const double y = (static_cast<double>(row) + (down + 0.5) / samples) * options_.cell_m + origin_y_;
         const float evidence = cell_evidence_[sampler.at(x, y)];
         if (!std::isnan(evidence)) {
           sum += evidence;
@@ -185,9 +186,9 @@ MapImage MapPicture::finish() const {
 
 void write_map(const MapImage& map, const std::string& directory, const std::string& stem) {
   char yaml[512];
-  std::snprintf(yaml, sizeof(yaml),
-                "resolution: %.9g\norigin: [%.6f, %.6f, 0.0]\nnegate: 0\noccupied_thresh: %g\nfree_thresh: %g\n",
-                map.cell_m, map.origin_x, map.origin_y, kOccupiedThreshold, kFreeThreshold);
+  (void)std::snprintf(yaml, sizeof(yaml),
+                      "resolution: %.9g\norigin: [%.6f, %.6f, 0.0]\nnegate: 0\noccupied_thresh: %g\nfree_thresh: %g\n",
+                      map.cell_m, map.origin_x, map.origin_y, kOccupiedThreshold, kFreeThreshold);
   const std::string path = directory + "/" + stem;
   write_file(path + ".pgm", encode_pgm(map.grey));
   write_file(path + ".png", encode_png(map.grey));

@@ -234,12 +234,12 @@ std::string carmen_line(const SimScan& scan) {
   char text[256];
   std::string line = "FLASER " + std::to_string(scan.ranges.size());
   for (const float range : scan.ranges) {
-    std::snprintf(text, sizeof(text), " %.2f", static_cast<double>(range));
+    (void)std::snprintf(text, sizeof(text), " %.2f", static_cast<double>(range));
     line += text;
   }
   const Pose2& o = scan.odometry_T_base;
-  std::snprintf(text, sizeof(text), " %.6f %.6f %.6f %.6f %.6f %.6f %.6f sim %.6f\n", o.x, o.y, o.theta, o.x, o.y,
-                o.theta, scan.seconds, scan.seconds);
+  (void)std::snprintf(text, sizeof(text), " %.6f %.6f %.6f %.6f %.6f %.6f %.6f sim %.6f\n", o.x, o.y, o.theta, o.x, o.y,
+                      o.theta, scan.seconds, scan.seconds);
   return line + text;
 }
 
@@ -248,7 +248,8 @@ std::string tum_line(const SimScan& scan) {
   char text[256];
   const Pose2& p = scan.world_T_base;
   const SinCos half = sincos(p.theta / 2.0);
-  std::snprintf(text, sizeof(text), "%.6f %.6f %.6f 0 0 0 %.9f %.9f\n", scan.seconds, p.x, p.y, half.sin, half.cos);
+  (void)std::snprintf(text, sizeof(text), "%.6f %.6f %.6f 0 0 0 %.9f %.9f\n", scan.seconds, p.x, p.y, half.sin,
+                      half.cos);
   return text;
 }
 
