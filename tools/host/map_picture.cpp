@@ -28,6 +28,28 @@ std::uint8_t grey_of(float evidence) {
   return grey == kMapUnobserved ? kMapUnobserved + 1 : grey;  // that grey is taken
 }
 
+/// A submap's cells by positions in the map.
+class GridSampler {
+ public:
+  GridSampler(const GridView& grid, const Pose2& map_T_submap)
+      : grid_(grid), submap_T_map_(inverse(map_T_submap)), rotation_(sincos(submap_T_map_.theta)) {}
+
+  /// The cell at a point of the map; kUnobserved outside the grid.
+  std::uint8_t at(double x, double y) const {
+    const double cell_m = static_cast<double>(grid_.cell_m);
+    const double half = grid_.side / 2.0;
+    const double column = std::floor((rotation_.cos * x - rotation_.sin * y + submap_T_map_.x) / cell_m + half);
+    const double row = std::floor((rotation_.sin * x + rotation_.cos * y + submap_T_map_.y) / cell_m + half);
+    const bool inside = column >= 0.0 && row >= 0.0 && column < grid_.side && row < grid_.side;
+    return inside ? grid_.at(static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row)) : kUnobserved;
+  }
+
+ private:
+  const GridView& grid_;
+  Pose2 submap_T_map_;
+  SinCos rotation_;
+};
+
 void check(bool good, const std::string& what) {
   if (!good) {
     throw std::invalid_argument("map picture: " + what);
@@ -83,6 +105,11 @@ MapPicture::MapPicture(const MapBounds& bounds, const MapPictureOptions& options
   origin_y_ = first_row * options.cell_m;
   width_ = static_cast<std::size_t>(columns);
   height_ = static_cast<std::size_t>(rows);
+  for (std::size_t cell = 0; cell < cell_evidence_.size(); ++cell) {
+    const double share = static_cast<double>(cell) / kCertainlyOccupied;
+    cell_evidence_[cell] = cell == kUnobserved ? std::numeric_limits<float>::quiet_NaN()
+                                               : static_cast<float>(log_odds(share) - log_odds(options.occupied_share));
+  }
   log_odds_.assign(width_ * height_, std::numeric_limits<float>::quiet_NaN());
 }
 
@@ -98,44 +125,32 @@ MapPicture::CellBox MapPicture::cells_under(const GridView& grid, const Pose2& m
           index(under.max_y + options_.cell_m, origin_y_, height_)};
 }
 
-/// Evidence at a point of the map; `observed` says whether the submap saw it.
-double MapPicture::evidence(const GridView& grid, const Pose2& submap_T_map, double x, double y, bool& observed) const {
-  const Pose2 p = compose(submap_T_map, {x, y, 0.0});
-  const double half = grid.side / 2.0;
-  const double column = std::floor(p.x / static_cast<double>(grid.cell_m) + half);
-  const double row = std::floor(p.y / static_cast<double>(grid.cell_m) + half);
-  observed = column >= 0.0 && row >= 0.0 && column < grid.side && row < grid.side;
-  if (!observed) {
-    return 0.0;
-  }
-  const std::uint8_t cell = grid.at(static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row));
-  observed = cell != kUnobserved;
-  return observed ? log_odds(cell / static_cast<double>(kCertainlyOccupied)) - log_odds(options_.occupied_share) : 0.0;
-}
-
 void MapPicture::add(const GridView& grid, const Pose2& map_T_submap) {
   check(grid.side > 0 && grid.cells.size() == static_cast<std::size_t>(grid.side) * grid.side && grid.cell_m > 0.0F,
         "expected a square grid with its cells");
   check(is_finite(map_T_submap), "expected a finite pose");
-  const Pose2 submap_T_map = inverse(map_T_submap);
+  const double cell_m = static_cast<double>(grid.cell_m);
   // A finer submap has several cells under a map cell: all are asked.
-  const int samples =
-      std::clamp(static_cast<int>(std::ceil(options_.cell_m / static_cast<double>(grid.cell_m) - 0.01)), 1, 16);
+  const int samples = std::clamp(static_cast<int>(std::ceil(options_.cell_m / cell_m - 0.01)), 1, 16);
+  const GridSampler sampler(grid, map_T_submap);
   const CellBox box = cells_under(grid, map_T_submap);
   for (std::size_t row = box.row; row < box.row_end; ++row) {
     for (std::size_t column = box.column; column < box.column_end; ++column) {
-      double sum = 0.0;
+      float sum = 0.0F;
       int count = 0;
       for (int i = 0; i < samples * samples; ++i) {
+        const int down = i / samples;
         const double x = (static_cast<double>(column) + (i % samples + 0.5) / samples) * options_.cell_m + origin_x_;
-        const double y = (static_cast<double>(row) + (i / samples + 0.5) / samples) * options_.cell_m + origin_y_;
-        bool observed = false;
-        sum += evidence(grid, submap_T_map, x, y, observed);
-        count += observed ? 1 : 0;
+        const double y = (static_cast<double>(row) + (down + 0.5) / samples) * options_.cell_m + origin_y_;
+        const float evidence = cell_evidence_[sampler.at(x, y)];
+        if (!std::isnan(evidence)) {
+          sum += evidence;
+          ++count;
+        }
       }
       if (count > 0) {
         float& cell = log_odds_[row * width_ + column];
-        cell = (std::isnan(cell) ? 0.0F : cell) + static_cast<float>(sum / count);
+        cell = (std::isnan(cell) ? 0.0F : cell) + sum / static_cast<float>(count);
       }
     }
   }
@@ -171,9 +186,9 @@ MapImage MapPicture::finish() const {
 
 void write_map(const MapImage& map, const std::string& directory, const std::string& stem) {
   char yaml[512];
-  std::snprintf(yaml, sizeof(yaml),
-                "resolution: %.9g\norigin: [%.6f, %.6f, 0.0]\nnegate: 0\noccupied_thresh: %g\nfree_thresh: %g\n",
-                map.cell_m, map.origin_x, map.origin_y, kOccupiedThreshold, kFreeThreshold);
+  (void)std::snprintf(yaml, sizeof(yaml),
+                      "resolution: %.9g\norigin: [%.6f, %.6f, 0.0]\nnegate: 0\noccupied_thresh: %g\nfree_thresh: %g\n",
+                      map.cell_m, map.origin_x, map.origin_y, kOccupiedThreshold, kFreeThreshold);
   const std::string path = directory + "/" + stem;
   write_file(path + ".pgm", encode_pgm(map.grey));
   write_file(path + ".png", encode_png(map.grey));

@@ -2,6 +2,7 @@
 // each with its pose, finish. Writes it as ROS's map_server reads it.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -66,14 +67,14 @@ class MapPicture {
  private:
   struct CellBox;
   CellBox cells_under(const GridView& grid, const Pose2& map_T_submap) const;
-  double evidence(const GridView& grid, const Pose2& submap_T_map, double x, double y, bool& observed) const;
 
   MapPictureOptions options_;
   double origin_x_ = 0.0;
   double origin_y_ = 0.0;
   std::size_t width_ = 0;
   std::size_t height_ = 0;
-  std::vector<float> log_odds_;  ///< NaN: unobserved. Row 0 has the smallest y
+  std::array<float, 256> cell_evidence_{};  ///< of each value of a submap cell; NaN: unobserved
+  std::vector<float> log_odds_;             ///< NaN: unobserved. Row 0 has the smallest y
 };
 
 /// Writes DIRECTORY/STEM.pgm, STEM.yaml and STEM.png (map_server's convention). Throws where a file cannot be written.

@@ -42,7 +42,7 @@ using Html = std::string;
 
 Html number(double value, int digits) {
   char text[64];
-  std::snprintf(text, sizeof(text), "%.*f", digits, value);
+  (void)std::snprintf(text, sizeof(text), "%.*f", digits, value);
   return text;
 }
 
@@ -146,6 +146,7 @@ Html memory(const ReportData& data) {
                             {"heap allocations after initialisation", count(m.heap_allocations_after_init)},
                             {"peak resident set of the program", bytes(m.peak_rss_bytes)}});
   std::vector<Share> rows;
+  rows.reserve(data.memory_parts.size());
   for (const auto& [name, size] : data.memory_parts) {
     rows.push_back({name, static_cast<double>(size), bytes(size)});
   }
@@ -171,6 +172,7 @@ Html pairs(const Summary& s) {
                                                                   {"registered", s.pairs.registered},
                                                                   {"accepted", s.pairs.accepted}};
   std::vector<Share> rows;
+  rows.reserve(counts.size());
   for (const auto& [name, value] : counts) {
     rows.push_back({name, static_cast<double>(value), count(value)});
   }
@@ -292,7 +294,7 @@ Html configuration(const Summary& s) {
       text = std::to_string(*whole);
     } else if (const double* real = std::get_if<double>(&value)) {
       char digits[64];
-      std::snprintf(digits, sizeof(digits), "%.9g", *real);
+      (void)std::snprintf(digits, sizeof(digits), "%.9g", *real);
       text = digits;
     } else {
       text = escape_html(std::get<std::string>(value));

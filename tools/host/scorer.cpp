@@ -283,7 +283,7 @@ void append_text(const nlohmann::ordered_json& json, std::string& text) {
       continue;
     }
     char number[64];
-    std::snprintf(number, sizeof(number), "%-18s %.4g\n", name.c_str(), value.get<double>());
+    (void)std::snprintf(number, sizeof(number), "%-18s %.4g\n", name.c_str(), value.get<double>());
     text += number;
   }
 }

@@ -20,6 +20,9 @@ constexpr double kSway_m = 0.2;          // how far the robot strays from the ce
 constexpr double kVisitedShare = 0.25;   // of the rooms that are open
 constexpr double kBeyondReach_m = 0.19;  // real scanners: 8 m reach, 8.19 where nothing was hit
 
+constexpr double kLeastStep_m = 0.005;
+constexpr double kLeastStep_rad = 0.005;
+
 enum Stream : std::uint64_t { kDrive = 1'000'000, kLaser = 2'000'000, kWheels = 3'000'000, kFrame = 4'000'000 };
 
 Random stream(const SimOptions& options, Stream part, int session) {
@@ -40,9 +43,13 @@ class Drive {
   double path_m() const { return path_m_; }
   const std::vector<TimedPose>& poses() const { return poses_; }
 
+  /// Scans again at the next pose, unless it is the present one.
   void move_to(const Pose2& next) {
     const double way = translation(between(pose(), next));
     const double turn = std::fabs(wrap_angle(next.theta - pose().theta));
+    if (way < kLeastStep_m && turn < kLeastStep_rad) {
+      return;
+    }
     path_m_ += way;
     poses_.push_back({poses_.back().seconds + way / kSpeed_m_s + turn / kTurnSpeed_rad_s, next});
   }
@@ -227,12 +234,12 @@ std::string carmen_line(const SimScan& scan) {
   char text[256];
   std::string line = "FLASER " + std::to_string(scan.ranges.size());
   for (const float range : scan.ranges) {
-    std::snprintf(text, sizeof(text), " %.2f", static_cast<double>(range));
+    (void)std::snprintf(text, sizeof(text), " %.2f", static_cast<double>(range));
     line += text;
   }
   const Pose2& o = scan.odometry_T_base;
-  std::snprintf(text, sizeof(text), " %.6f %.6f %.6f %.6f %.6f %.6f %.6f sim %.6f\n", o.x, o.y, o.theta, o.x, o.y,
-                o.theta, scan.seconds, scan.seconds);
+  (void)std::snprintf(text, sizeof(text), " %.6f %.6f %.6f %.6f %.6f %.6f %.6f sim %.6f\n", o.x, o.y, o.theta, o.x, o.y,
+                      o.theta, scan.seconds, scan.seconds);
   return line + text;
 }
 
@@ -241,7 +248,8 @@ std::string tum_line(const SimScan& scan) {
   char text[256];
   const Pose2& p = scan.world_T_base;
   const SinCos half = sincos(p.theta / 2.0);
-  std::snprintf(text, sizeof(text), "%.6f %.6f %.6f 0 0 0 %.9f %.9f\n", scan.seconds, p.x, p.y, half.sin, half.cos);
+  (void)std::snprintf(text, sizeof(text), "%.6f %.6f %.6f 0 0 0 %.9f %.9f\n", scan.seconds, p.x, p.y, half.sin,
+                      half.cos);
   return text;
 }
 

@@ -29,7 +29,7 @@ struct SimOptions {
   double range_noise_m = 0.01;  ///< deviation of a range
   double no_return_share = 0.005;        ///< beams that come back empty at random
   double outlier_share = 0.002;          ///< beams that end early at random
-  double scale_error = -0.06;            ///< odometry: share by which a way is read too long
+  double scale_error = -0.04;            ///< odometry: share by which a way is read too long
   double turn_error_rad_per_m = -0.005;  ///< odometry: bias of the heading, a metre driven
   double way_noise = 0.03;               ///< odometry: deviation of a step's length, share of it
   double turn_noise_rad = 0.002;         ///< odometry: deviation of a step's turn

@@ -81,9 +81,9 @@ std::string submaps_csv(const std::vector<SubmapRow>& rows) {
   std::string csv = "id,session,component,scans,timestamp,x,y,theta\n";
   char text[256];
   for (const SubmapRow& r : rows) {
-    std::snprintf(text, sizeof(text), ",%llu,%llu,%.6f,%.6f,%.6f,%.9f\n", static_cast<unsigned long long>(r.component),
-                  static_cast<unsigned long long>(r.scans), r.timestamp_s, r.map_T_submap.x, r.map_T_submap.y,
-                  r.map_T_submap.theta);
+    (void)std::snprintf(text, sizeof(text), ",%llu,%llu,%.6f,%.6f,%.6f,%.9f\n",
+                        static_cast<unsigned long long>(r.component), static_cast<unsigned long long>(r.scans),
+                        r.timestamp_s, r.map_T_submap.x, r.map_T_submap.y, r.map_T_submap.theta);
     csv += std::to_string(r.id) + "," + csv_field(r.session) + text;
   }
   return csv;
@@ -93,8 +93,8 @@ std::string matches_csv(const std::vector<MatchRow>& rows) {
   std::string csv = "a,b,kind,stage,score,agreement,x,y,theta,accepted,why\n";
   char text[256];
   for (const MatchRow& r : rows) {
-    std::snprintf(text, sizeof(text), ",%.6g,%.6g,%.6f,%.6f,%.9f,%d,", r.score, r.agreement, r.a_T_b.x, r.a_T_b.y,
-                  r.a_T_b.theta, r.accepted ? 1 : 0);
+    (void)std::snprintf(text, sizeof(text), ",%.6g,%.6g,%.6f,%.6f,%.9f,%d,", r.score, r.agreement, r.a_T_b.x, r.a_T_b.y,
+                        r.a_T_b.theta, r.accepted ? 1 : 0);
     csv += std::to_string(r.a) + "," + std::to_string(r.b) + "," + csv_field(r.kind) + "," + csv_field(r.stage) + text +
            csv_field(r.why) + "\n";
   }
