@@ -4,4 +4,9 @@
 
 #include <CLI/CLI.hpp>
 
-namespace mellin::program {}  // namespace mellin::program
+namespace mellin::program {
+
+/// store info|verify|dump: looks into a flash image.
+void add_store(CLI::App& app);
+
+}  // namespace mellin::program
