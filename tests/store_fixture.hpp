@@ -12,6 +12,16 @@
 
 namespace mellin::test {
 
+/// std::mt19937 with results of 32 bits (its own are unsigned long).
+class Random32 {
+ public:
+  explicit Random32(std::uint32_t seed) : engine_(seed) {}
+  std::uint32_t operator()() { return static_cast<std::uint32_t>(engine_()); }
+
+ private:
+  std::mt19937 engine_;
+};
+
 struct Geometry {
   std::uint32_t block_size;
   std::uint32_t block_count;

@@ -10,8 +10,6 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "mellin/store/flash_format.hpp"
-
 namespace mellin::posix {
 namespace {
 
@@ -180,24 +178,24 @@ int FlashImage::sync(void* context) {
   return self.read_only_ || ::fsync(self.file_) == 0 ? 0 : kFileError;
 }
 
-FlashGeometry probe_geometry(const std::string& path) {
+ImageInfo probe_image(const std::string& path) {
   constexpr std::uint64_t kSmallestBlock = 4096;
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
   if (file < 0) {
     fail(path, std::string("cannot be opened: ") + std::strerror(errno));
   }
   const std::uint64_t size = file_size(file);
-  FlashGeometry geometry;
+  ImageInfo info;
+  FlashGeometry& geometry = info.geometry;
   bool found = false;
-  std::uint32_t newest = 0;
   // Of all headers the newest one speaks; every block begins at a multiple of the smallest block.
   for (std::uint64_t at = 0; at + kBlockHeaderBytes <= size && size <= kMostBytes; at += kSmallestBlock) {
     std::array<std::uint8_t, kBlockHeaderBytes> bytes{};
     BlockHeader header;
     if (read_all(file, bytes.data(), bytes.size(), at) &&
         decode_block_header(Span<const std::uint8_t>(bytes.data(), bytes.size()), header) == Status::ok &&
-        header.block_size != 0 && at % header.block_size == 0 && header.sequence > newest) {
-      newest = header.sequence;
+        header.block_size != 0 && at % header.block_size == 0 && header.sequence > info.newest.sequence) {
+      info.newest = header;
       geometry = {header.block_size, header.block_count, header.program_unit};
       found = true;
     }
@@ -210,7 +208,7 @@ FlashGeometry probe_geometry(const std::string& path) {
     fail(path, "expected " + std::to_string(geometry.block_count) + " blocks of " +
                    std::to_string(geometry.block_size) + " bytes, found " + std::to_string(size) + " bytes");
   }
-  return geometry;
+  return info;
 }
 
 RamFlash::RamFlash(const FlashGeometry& geometry) : geometry_(geometry) {

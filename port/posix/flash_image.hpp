@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mellin/port.h"
+#include "mellin/store/flash_format.hpp"
 
 namespace mellin::posix {
 
@@ -55,9 +56,15 @@ class FlashImage {
   bool read_only_ = false;
 };
 
-/// The geometry that the block headers of an image tell. Throws std::runtime_error, naming the file, where it cannot be
-/// read, holds no block header, or has not the size that they tell.
-FlashGeometry probe_geometry(const std::string& path);
+/// What an image says about itself.
+struct ImageInfo {
+  FlashGeometry geometry;
+  BlockHeader newest;  ///< of the blocks' headers, the one with the highest sequence
+};
+
+/// Looks for block headers in an image. Throws std::runtime_error, naming the file, where it cannot be read, holds
+/// none, or has not the size that they tell.
+ImageInfo probe_image(const std::string& path);
 
 /// The same rules in memory, for runs that keep nothing.
 class RamFlash {

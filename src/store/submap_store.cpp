@@ -118,8 +118,7 @@ Status SubmapStore::apply_group(LogCursor from, const LogRecord& commit_record) 
   }
   if (status != Status::ok || commit_record.header.length != sizeof payload ||
       decode_commit(payload, commit) != Status::ok) {
-    ++lost_records_;
-    return Status::lost;
+    return Status::lost;  // torn; were it damaged, the next commit will tell
   }
   if (previous_group_ != 0 && commit.previous_group != previous_group_) {
     ++lost_records_;

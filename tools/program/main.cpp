@@ -8,9 +8,11 @@ int main(int argc, char** argv) {
   CLI::App app{"Hierarchical 2D lidar SLAM: maps logs, registers grids, optimises pose graphs"};
   app.require_subcommand(1);
   mellin::program::add_map(app);
+  mellin::program::add_match(app);
   mellin::program::add_optimize(app);
   mellin::program::add_score(app);
   mellin::program::add_sim(app);
+  mellin::program::add_store(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
