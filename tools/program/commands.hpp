@@ -8,5 +8,6 @@ namespace mellin::program {
 
 void add_sim(CLI::App& app);    ///< mellin sim
 void add_score(CLI::App& app);  ///< mellin score
+void add_match(CLI::App& app);  ///< mellin match
 
 }  // namespace mellin::program

@@ -9,6 +9,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   mellin::program::add_sim(app);
   mellin::program::add_score(app);
+  mellin::program::add_match(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
