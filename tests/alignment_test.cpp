@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@ using namespace mellin;
 namespace {
 
 constexpr double kDegree = kPi / 180.0;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 /// An alignment with its memory.
 class Bench {
@@ -195,7 +197,7 @@ TEST_CASE("alignment refuses misuse and says where there is nothing to align") {
   const std::vector<std::uint8_t> large(66 * 66, 0);
   CHECK(bench.alignment.begin({{large.data(), large.size()}, 66, 0.05F}, grid, {}) == Status::invalid_argument);
   CHECK(bench.alignment.begin(grid, {{free.data(), 10}, 64, 0.05F}, {}) == Status::invalid_argument);
-  CHECK(bench.alignment.begin(grid, grid, {NAN, 0.0, 0.0}) == Status::invalid_argument);
+  CHECK(bench.alignment.begin(grid, grid, {kNan, 0.0, 0.0}) == Status::invalid_argument);
   CHECK(bench.alignment.result().status() == Status::busy);
   REQUIRE(bench.alignment.begin(grid, grid, {}) == Status::ok);
   CHECK(bench.alignment.result().status() == Status::busy);

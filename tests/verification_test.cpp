@@ -2,7 +2,7 @@
 
 #include <doctest.h>
 
-#include <cmath>
+#include <limits>
 #include <vector>
 
 #include "mellin/grid/digest.hpp"
@@ -12,6 +12,7 @@ using namespace mellin;
 namespace {
 
 constexpr std::uint16_t kSide = 32;
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::uint8_t kWall = kCertainlyOccupied;
 
 /// A grid of 0.2 m cells, all free.
@@ -167,13 +168,13 @@ TEST_CASE("verification refuses what is not a grid, a pose or a configuration") 
   CHECK(classify(grid.view(), {}, 0, out).status() == Status::invalid_argument);
   CHECK(classify(grid.view(), {}, kSide, out.first(10)).status() == Status::invalid_argument);
   GridView bad = grid.view();
-  bad.cell_m = NAN;
+  bad.cell_m = std::numeric_limits<float>::quiet_NaN();
   CHECK(classify(bad, {}, kSide, out).status() == Status::invalid_argument);
   VerificationConfig config;
   config.clear_cells = 0;
   CHECK(classify(grid.view(), config, kSide, out).status() == Status::invalid_config);
   const Classes a(grid.view());
-  CHECK(verify(a.view, a.view, {NAN, 0.0, 0.0}).status() == Status::invalid_argument);
+  CHECK(verify(a.view, a.view, {kNan, 0.0, 0.0}).status() == Status::invalid_argument);
   CHECK(verify(a.view, {}, {}).status() == Status::invalid_argument);
   CHECK(agreement(a, a, {1e30, -1e30, 1.0}).shared_cells == 0);
 }
