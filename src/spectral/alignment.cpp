@@ -16,7 +16,9 @@ constexpr double kConvergedXy = 1e-3;      // m
 constexpr double kConvergedTheta = 2e-4;   // rad
 constexpr std::uint32_t kFewestInliers = 30;
 constexpr float kNormalWindow_m = 0.3F;  // half side of the window that a wall's direction is taken from
-constexpr float kStraightness = 0.1F;    // largest ratio of the scatter across to the scatter along a wall
+constexpr float kMostCellsInWindow = 16.0F;
+constexpr float kStraightness = 0.1F;       // largest ratio of the scatter across to the scatter along a wall
+constexpr float kMostCellsOfReach = 64.0F;  // bounds the work an obstacle makes, however small the cells are
 constexpr float kFewestInWindow = 4.0F;
 
 bool valid(const AlignmentConfig& c) {
@@ -232,8 +234,8 @@ void Alignment::build_field() {
 
 /// Lowers the field to the distance from an obstacle (cells from the corner) wherever that is nearer.
 void Alignment::stamp_distance(const Point2f& obstacle) {
-  const float reach = config_.capture_m / onto_.cell_m;
-  const float units = kUnitsAtCapture / reach;
+  const float reach = std::min(config_.capture_m / onto_.cell_m, kMostCellsOfReach);
+  const float units = kUnitsAtCapture * (onto_.cell_m / config_.capture_m);
   const auto limit = static_cast<float>(onto_.side - 1);
   const int first_column = static_cast<int>(std::max(0.0F, obstacle.x - reach));
   const int last_column = static_cast<int>(std::min(limit, obstacle.x + reach));
@@ -266,7 +268,7 @@ void Alignment::count_obstacles() {
 void Alignment::collect_points() {
   const int end = slice_end(from_);
   const std::uint32_t wanted = std::min<std::uint32_t>(obstacles_, config_.max_points);
-  const int reach = std::max(1, static_cast<int>(kNormalWindow_m / from_.cell_m));
+  const int reach = static_cast<int>(std::clamp(kNormalWindow_m / from_.cell_m, 1.0F, kMostCellsInWindow));
   const float half = 0.5F * static_cast<float>(from_.side);
   for (int row = row_; row < end; ++row) {
     for (int column = 0; column < from_.side; ++column) {

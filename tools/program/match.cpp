@@ -1,0 +1,76 @@
+// mellin match: registers two occupancy grids.
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "host/grid_image.hpp"
+#include "host/grid_registration.hpp"
+#include "program/commands.hpp"
+
+namespace mellin::program {
+namespace {
+
+struct MatchCommand {
+  std::string a;
+  std::string b;
+  std::string mask_a;
+  std::string mask_b;
+  double resolution_m = 0.05;
+  bool all = false;
+};
+
+host::OccupancyImage read(const std::string& path, const std::string& mask) {
+  host::OccupancyImage image = host::read_occupancy_image(path);
+  if (!mask.empty()) {
+    host::apply_mask(image, mask);
+  }
+  return image;
+}
+
+void run(const MatchCommand& command) {
+  const host::OccupancyImage a = read(command.a, command.mask_a);
+  const host::OccupancyImage b = read(command.b, command.mask_b);
+  const auto start = std::chrono::steady_clock::now();
+  const std::vector<host::GridHypothesis> hypotheses = host::register_grids(a, b, command.resolution_m);
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+
+  nlohmann::ordered_json out;
+  out["hypotheses"] = nlohmann::ordered_json::array();
+  for (const host::GridHypothesis& h : hypotheses) {
+    if (command.all || h.confidence >= host::kAcceptedConfidence) {
+      out["hypotheses"].push_back({{"x", h.a_T_b.x},
+                                   {"y", h.a_T_b.y},
+                                   {"theta", h.a_T_b.theta},
+                                   {"confidence", h.confidence},
+                                   {"peak", h.peak},
+                                   {"agreement", h.agreement}});
+    }
+  }
+  out["seconds"] = seconds.count();
+  std::printf("%s\n", out.dump().c_str());
+}
+
+}  // namespace
+
+void add_match(CLI::App& app) {
+  auto match = std::make_shared<MatchCommand>();
+  CLI::App* command = app.add_subcommand(
+      "match",
+      "Registers two occupancy grids (PGM or PNG: dark occupied, light free, 205 unobserved) and prints the poses of "
+      "B's "
+      "frame in A's as JSON, best first. The confidence grows with agreement, alignment, margin over other places and "
+      "peak, from 0 to 1; it is not calibrated as a probability yet");
+  command->add_option("A", match->a, "a grid")->required();
+  command->add_option("B", match->b, "the grid to be placed in it")->required();
+  command->add_option("--mask-a", match->mask_a, "picture that is white where A is observed");
+  command->add_option("--mask-b", match->mask_b, "picture that is white where B is observed");
+  command->add_option("--resolution", match->resolution_m, "edge of a cell, m")
+      ->check(CLI::Range(1e-4, 1e3))
+      ->capture_default_str();
+  command->add_flag("--all", match->all, "print the hypotheses under the acceptance threshold (0.5) too");
+  command->callback([match] { run(*match); });
+}
+
+}  // namespace mellin::program
