@@ -112,7 +112,7 @@ TEST_CASE("an exact scan ends on obstacles and passes through none") {
 }
 
 TEST_CASE("the robot drives far, twice round, in small steps, and into nothing") {
-  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 2; ++seed) {
     SimOptions options;
     options.seed = seed;
     options.sessions = 3;
