@@ -224,8 +224,8 @@ TEST_CASE("relative covariances agree with a dense inverse, by either solver") {
             return Eigen::Vector3d(p.x, p.y, p.theta);
           };
           if (a != b) {
-            j.col(3 * a + c) = (column(a, 1e-6) - column(a, -1e-6)) / 2e-6;
-            j.col(3 * b + c) = (column(b, 1e-6) - column(b, -1e-6)) / 2e-6;
+            j.col(3 * static_cast<int>(a) + c) = (column(a, 1e-6) - column(a, -1e-6)) / 2e-6;
+            j.col(3 * static_cast<int>(b) + c) = (column(b, 1e-6) - column(b, -1e-6)) / 2e-6;
           }
         }
         const Eigen::Matrix3d exact = j * covariance * j.transpose();
@@ -366,7 +366,7 @@ TEST_CASE("wild numbers within the limits end without a crash and with finite po
     for (int i = 0; i < 20; ++i) {
       REQUIRE(rig.graph.add_node({clamped(1e9), clamped(1e9), clamped(1e5)}).ok());
     }
-    for (int i = 0; i < 60; ++i) {
+    for (NodeId i = 0; i < 60; ++i) {
       const NodeId a = static_cast<NodeId>(random.uniform() * 20);
       const Sym3 information = diagonal(std::abs(wild()), std::abs(wild()), std::abs(wild()));
       (void)rig.graph.add_edge(a, (a + 1 + i) % 20, i % 3 == 0 ? EdgeKind::odometry : EdgeKind::loop,

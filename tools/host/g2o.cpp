@@ -213,16 +213,16 @@ void write_g2o(const std::string& path, const G2oGraph& graph) {
   std::array<char, 320> text{};
   for (std::size_t i = 0; i < graph.ids.size(); ++i) {
     const Pose2& p = graph.poses[i];
-    std::snprintf(text.data(), text.size(), "VERTEX_SE2 %lld %.12g %.12g %.12g\n", static_cast<long long>(graph.ids[i]),
-                  p.x, p.y, p.theta);
+    (void)std::snprintf(text.data(), text.size(), "VERTEX_SE2 %lld %.12g %.12g %.12g\n",
+                        static_cast<long long>(graph.ids[i]), p.x, p.y, p.theta);
     out << text.data();
   }
   for (const G2oEdge& e : graph.edges) {
     const Sym3& m = e.information;
-    std::snprintf(text.data(), text.size(),
-                  "EDGE_SE2 %lld %lld %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g\n",
-                  static_cast<long long>(graph.ids[e.a]), static_cast<long long>(graph.ids[e.b]), e.a_T_b.x, e.a_T_b.y,
-                  e.a_T_b.theta, m.xx, m.xy, m.xt, m.yy, m.yt, m.tt);
+    (void)std::snprintf(text.data(), text.size(),
+                        "EDGE_SE2 %lld %lld %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g %.12g\n",
+                        static_cast<long long>(graph.ids[e.a]), static_cast<long long>(graph.ids[e.b]), e.a_T_b.x,
+                        e.a_T_b.y, e.a_T_b.theta, m.xx, m.xy, m.xt, m.yy, m.yt, m.tt);
     out << text.data();
   }
   out.flush();
