@@ -36,7 +36,7 @@ Status MapCollection::begin_session(const SessionId& id) {
   return Status::ok;
 }
 
-Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot) {
+Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, const Sym3& drift) {
   if (!ready() || session_count_ == 0) {
     return Status::busy;
   }
@@ -55,14 +55,14 @@ Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot) {
   memory_.scans[id] = {session_, header.first_scan, header.scan_count};
   slot_ = static_cast<SlotHandle&&>(slot);
   (void)store_->slots().assign(slot_, id);
-  link_odometry(id);
+  link_odometry(id, drift);
   newest_ = id;
   const bool described = digests_->begin_describe(id, store_->slots().view(slot_)) == Status::ok;
   stage_ = described ? Stage::describe : Stage::store_submap;
   return id;
 }
 
-void MapCollection::link_odometry(SubmapId id) {
+void MapCollection::link_odometry(SubmapId id, const Sym3& drift) {
   odometry_edge_ = kNoId;
   if (newest_ == kNoSubmap) {
     return;
@@ -72,8 +72,12 @@ void MapCollection::link_odometry(SubmapId id) {
   const double distance = translation(step);
   const double m = static_cast<double>(noise.base_m) + static_cast<double>(noise.per_m) * distance;
   const double rad = static_cast<double>(noise.base_rad) + static_cast<double>(noise.per_m_rad) * distance;
-  const Result<EdgeId> edge =
-      graph_.add_edge(newest_, id, EdgeKind::odometry, step, diagonal(1.0 / (m * m), 1.0 / (m * m), 1.0 / (rad * rad)));
+  const auto share = static_cast<double>(noise.drift_share);
+  Sym3 information;
+  if (!invert(diagonal(m * m, m * m, rad * rad) + scale(drift, share * share), information)) {
+    information = diagonal(1.0 / (m * m), 1.0 / (m * m), 1.0 / (rad * rad));
+  }
+  const Result<EdgeId> edge = graph_.add_edge(newest_, id, EdgeKind::odometry, step, information);
   if (edge.ok()) {
     odometry_edge_ = edge.value();
   } else {

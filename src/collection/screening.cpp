@@ -175,15 +175,7 @@ bool SpectralScreening::step() {
 }
 
 ClassView SpectralScreening::classes(std::uint32_t index, Span<std::uint8_t> out) {
-  const DigestOut digest = digest_out(index);
-  const std::size_t pixels = std::size_t{digest.side} * digest.side;
-  for (std::size_t i = 0; i < pixels; ++i) {
-    memory_.cells[i] = !mask_bit(digest.observed, i) ? kUnobserved
-                       : mask_bit(digest.free, i)    ? std::uint8_t{0}
-                                                     : kCertainlyOccupied;
-  }
-  const Result<ClassView> view =
-      classify({memory_.cells, digest.side, config_.matcher.pixel_m}, config_.verification, digest.side, out);
+  const Result<ClassView> view = classify(digest(index), config_.verification, out);
   return view.ok() ? view.value() : ClassView{};
 }
 

@@ -56,6 +56,11 @@ Sym3 compose_covariance(const Pose2& a_T_b, const Sym3& cov_ab, const Pose2& b_T
   return sandwich(j_ab, cov_ab) + rotate(cov_bc, a_T_b.theta);
 }
 
+Sym3 carried(const Sym3& cov_c, const Pose2& b_T_c) {
+  const SinCos r = sincos(b_T_c.theta);
+  return sandwich({{{r.cos, -r.sin, b_T_c.y}, {r.sin, r.cos, -b_T_c.x}, {0.0, 0.0, 1.0}}}, cov_c);
+}
+
 Sym3 inverse_covariance(const Pose2& a_T_b, const Sym3& cov_ab) {
   const SinCos r = sincos(a_T_b.theta);
   const Pose2 inv = inverse(a_T_b);

@@ -91,6 +91,7 @@ Result<ScanOutcome> ParticleMapper::add(const Scan& scan) {
   const Sym3 prior = prior_information(motion);
   if (outcome.taken) {
     taken_odometry_ = scan.odom_T_base;
+    motion_ = since_taken;
     outcome.use = take(predicted, prior) ? ScanUse::taken : ScanUse::odometry;
     ++statistics_.taken;
   } else {
@@ -133,6 +134,13 @@ bool ParticleMapper::take(const Pose2& predicted, const Sym3& prior) {
   }
   tracked_ = memory_.particles[best_].pose;
   tracked_information_ = memory_.particles[best_].information;
+  // Over the whole way since the last taken scan: where neither this match nor those on the way determined the pose,
+  // odometry did.
+  const Sym3 way = prior_information(motion_);
+  const Sym3 information = tracked_information_ + scale(prior, -1.0) + way;
+  if (!invert(information, memory_.covariances[number % pose_capacity()])) {
+    (void)invert(way, memory_.covariances[number % pose_capacity()]);
+  }
   const bool matched = any_matched && (number == 0 || memory_.particles[best_].matched);
   if (config_.particles > 1) {
     resample_if_poor();

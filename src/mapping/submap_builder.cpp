@@ -59,6 +59,9 @@ Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells,
   for (std::uint32_t i = 0; i < scan_count_; ++i) {
     memory_.poses[i] = between(centre, mapper.scan_pose(first_scan_ + i));
   }
+  const std::uint32_t middle = first_scan_ + scan_count_ / 2;
+  drift_ = any_frozen_ ? drift_since(mapper, centre, middle_, middle) : Sym3{};
+  middle_ = middle;
   header.session_T_submap = centre;
   header.submap_T_robot = memory_.poses[scan_count_ - 1];
   header.stamp_us = mapper.scans().stamp_us(end - 1);
@@ -71,6 +74,19 @@ Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells,
   new_scans_ = 0;
   new_path_m_ = 0.0;
   return Status::ok;
+}
+
+Sym3 SubmapBuilder::drift_since(const LocalMapper& mapper, const Pose2& session_T_submap, std::uint32_t from,
+                                std::uint32_t to) const {
+  const std::uint32_t oldest = mapper.first_remembered();
+  Sym3 sum;
+  std::uint32_t count = 0;
+  for (std::uint32_t number = (from < oldest ? oldest : from) + 1; number <= to; ++number) {
+    const Pose2 submap_T_robot = between(session_T_submap, mapper.scan_pose(number));
+    sum = sum + carried(mapper.scan_covariance(number), submap_T_robot);
+    ++count;
+  }
+  return scale(sum, count);
 }
 
 Result<bool> SubmapBuilder::step(const ScanMemory& scans) {

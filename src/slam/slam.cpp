@@ -132,7 +132,7 @@ void Slam::render_slice() {
 }
 
 void Slam::hand_over() {
-  const Result<SubmapId> id = collection_.insert(header_, slot_);
+  const Result<SubmapId> id = collection_.insert(header_, slot_, builder_.drift());
   rendered_ = false;
   if (!id.ok()) {
     ++statistics_.submaps_lost;

@@ -159,8 +159,8 @@ void fft2(benchmark::State& state) {
 struct Bench {
   Bench(int side, int peaks)
       : config{.side = static_cast<std::uint16_t>(side),
-               .peak_share = 0.0F,
-               .max_peaks = static_cast<std::uint8_t>(peaks)} {
+               .max_peaks = static_cast<std::uint8_t>(peaks),
+               .peak_share = 0.0F} {
     pixels_a = picture(side, 0.3);
     pixels_b = picture(side, 1.1);
     ready = matcher.init(config, matcher_memory.memory) == mellin::Status::ok &&

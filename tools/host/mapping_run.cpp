@@ -1,8 +1,11 @@
 #include "host/mapping_run.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <stdexcept>
 
+#include "host/heap_counter.hpp"
 #include "posix/clock.hpp"
 
 namespace mellin::host {
@@ -15,13 +18,6 @@ bool same_laser(const LaserConfig& a, const LaserConfig& b) {
 }
 
 }  // namespace
-
-/// The library's memory, and what its port points to.
-struct MappingRun::Memory {
-  explicit Memory(std::size_t bytes) : words((bytes + sizeof(std::uint64_t) - 1) / sizeof(std::uint64_t)) {}
-  std::vector<std::uint64_t> words;
-  std::function<void(const std::string&)> log_sink;
-};
 
 std::vector<std::uint8_t> add_lasers(Config& config, const Log& log) {
   std::vector<std::uint8_t> indices;
@@ -48,19 +44,16 @@ std::vector<std::uint8_t> add_lasers(Config& config, const Log& log) {
 
 MappingRun::MappingRun(const Config& config, const mellin_flash& flash,
                        std::function<void(const std::string&)> log_sink)
-    : memory_(std::make_unique<Memory>(required_bytes(config))) {
-  memory_->log_sink = std::move(log_sink);
+    : memory_((required_bytes(config) + sizeof(std::uint64_t) - 1) / sizeof(std::uint64_t)),
+      log_sink_(std::move(log_sink)) {
+  reserve_room();
   mellin_port port = {};
   port.flash = flash;
   port.clock = posix::monotonic_clock();
-  port.log = {memory_.get(), [](void* context, mellin_log_level level, const char* line) {
-                const auto& sink = static_cast<Memory*>(context)->log_sink;
-                if (sink && level != MELLIN_LOG_DEBUG) {
-                  sink(line);
-                }
-              }};
-  const Span<std::byte> bytes(reinterpret_cast<std::byte*>(memory_->words.data()), required_bytes(config));
+  port.log = {this, log_line};
+  const Span<std::byte> bytes(reinterpret_cast<std::byte*>(memory_.data()), required_bytes(config));
   Result<Slam*> slam = Slam::create(config, bytes, port);
+  take_events();
   if (!slam.ok()) {
     throw std::runtime_error(std::string("the library refuses to start: ") + to_string(slam.status()));
   }
@@ -70,39 +63,75 @@ MappingRun::MappingRun(const Config& config, const mellin_flash& flash,
   next_stored_ = slam_->collection().size();
 }
 
-MappingRun::~MappingRun() = default;
+void MappingRun::reserve_room() {
+  lines_.reserve(256);
+  pairs_.reserve(4096);
+  frozen_.reserve(64);
+  frozen_poses_.reserve(4096);
+}
+
+void MappingRun::log_line(void* context, mellin_log_level level, const char* line) {
+  if (level != MELLIN_LOG_DEBUG) {
+    std::array<char, 160> text{};
+    std::strncpy(text.data(), line, text.size() - 1);
+    static_cast<MappingRun*>(context)->lines_.push_back(text);
+  }
+}
 
 void MappingRun::frozen(void* context, SubmapId id, std::uint32_t first_scan, Span<const Pose2> submap_T_scan) {
-  MappedSession& session = static_cast<MappingRun*>(context)->sessions_.back();
-  session.submaps.push_back(id);
-  const std::size_t count = submap_T_scan.size();
-  if (session.placements.size() < first_scan + count) {
-    session.placements.resize(first_scan + count);
-  }
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto centrality = static_cast<double>(std::min(i + 1, count - i));
-    session.placements[first_scan + i].push_back({id, submap_T_scan[i], centrality});
-  }
+  MappingRun& self = *static_cast<MappingRun*>(context);
+  self.frozen_.push_back({id, first_scan, self.frozen_poses_.size(), submap_T_scan.size()});
+  self.frozen_poses_.insert(self.frozen_poses_.end(), submap_T_scan.begin(), submap_T_scan.end());
 }
 
 void MappingRun::pair_seen(void* context, const PairEvent& event) {
-  MatchRow row;
-  row.a = event.a;
-  row.b = event.b;
-  row.kind = event.between_sessions ? "merge" : "loop";
-  row.stage = event.stage == PairEvent::Stage::screened     ? "screened"
-              : event.stage == PairEvent::Stage::registered ? "registered"
-                                                            : "decided";
-  row.score = static_cast<double>(event.score);
-  row.agreement = static_cast<double>(event.agreement);
-  row.a_T_b = event.a_T_b;
-  row.accepted = event.accepted;
-  row.why = to_string(event.reason);
-  static_cast<MappingRun*>(context)->matches_.push_back(row);
+  static_cast<MappingRun*>(context)->pairs_.push_back(event);
+}
+
+void MappingRun::take_events() {
+  for (const std::array<char, 160>& line : lines_) {
+    if (log_sink_) {
+      log_sink_(line.data());
+    }
+  }
+  lines_.clear();
+  for (const FrozenSubmap& submap : frozen_) {
+    MappedSession& session = sessions_.back();
+    session.submaps.push_back(submap.id);
+    session.placements.resize(std::max(session.placements.size(), submap.first_scan + submap.count));
+    for (std::size_t i = 0; i < submap.count; ++i) {
+      const auto centrality = static_cast<double>(std::min(i + 1, submap.count - i));
+      session.placements[submap.first_scan + i].push_back(
+          {submap.id, frozen_poses_[submap.first_pose + i], centrality});
+    }
+  }
+  frozen_.clear();
+  frozen_poses_.clear();
+  for (const PairEvent& event : pairs_) {
+    MatchRow row;
+    row.a = event.a;
+    row.b = event.b;
+    row.kind = event.between_sessions ? "merge" : "loop";
+    row.stage = event.stage == PairEvent::Stage::screened     ? "screened"
+                : event.stage == PairEvent::Stage::registered ? "registered"
+                                                              : "decided";
+    row.score = static_cast<double>(event.score);
+    row.agreement = static_cast<double>(event.agreement);
+    row.a_T_b = event.a_T_b;
+    row.accepted = event.accepted;
+    row.why = to_string(event.reason);
+    matches_.push_back(row);
+  }
+  pairs_.clear();
 }
 
 void MappingRun::drain() {
-  while (slam_->work(64)) {
+  for (bool more = true; more;) {
+    {
+      const LibraryCall inside;
+      more = slam_->work(64);
+    }
+    take_events();
   }
   const std::uint32_t stored = slam_->collection().statistics().stored;
   for (; reported_stored_ < stored; ++reported_stored_) {
@@ -131,7 +160,10 @@ void MappingRun::map(const Log& log, const std::vector<std::uint8_t>& lasers,
     scan.ranges_m = Span<const float>(in.ranges.data(), in.ranges.size());
     scan.odom_T_base = in.odometry;
     scan.laser = lasers[in.laser];
-    const Result<ScanOutcome> outcome = slam_->add(scan);
+    const Result<ScanOutcome> outcome = [&] {
+      const LibraryCall inside;
+      return slam_->add(scan);
+    }();
     MappedSession& session = sessions_.back();
     MappedSession::MappedScan mapped;
     mapped.stamp = in.stamp;

@@ -2,9 +2,9 @@
 // the pose of every scan, live and final, and what became of each pair of submaps.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <functional>
-#include <memory>
 #include <string>
 #include <vector>
 
@@ -46,7 +46,6 @@ class MappingRun {
  public:
   /// `config` has all lasers of all logs. Throws std::runtime_error with the library's own words where it refuses.
   MappingRun(const Config& config, const mellin_flash& flash, std::function<void(const std::string&)> log_sink);
-  ~MappingRun();
   MappingRun(const MappingRun&) = delete;
   MappingRun& operator=(const MappingRun&) = delete;
 
@@ -73,13 +72,28 @@ class MappingRun {
   bool with_grid(SubmapId id, const std::function<void(const GridView&)>& use);
 
  private:
+  // The library calls these; what they keep goes into room reserved before, so that nothing they do counts as the
+  // library's use of the heap.
+  static void log_line(void* context, mellin_log_level level, const char* line);
   static void frozen(void* context, SubmapId id, std::uint32_t first_scan, Span<const Pose2> submap_T_scan);
   static void pair_seen(void* context, const PairEvent& event);
+  void reserve_room();
+  void take_events();
   void drain();
   Pose2 scan_pose(const MappedSession& session, std::uint32_t scan) const;
 
-  struct Memory;
-  std::unique_ptr<Memory> memory_;
+  struct FrozenSubmap {
+    SubmapId id = kNoSubmap;
+    std::uint32_t first_scan = 0;
+    std::size_t first_pose = 0;
+    std::size_t count = 0;
+  };
+  std::vector<std::uint64_t> memory_;
+  std::function<void(const std::string&)> log_sink_;
+  std::vector<std::array<char, 160>> lines_;
+  std::vector<PairEvent> pairs_;
+  std::vector<FrozenSubmap> frozen_;
+  std::vector<Pose2> frozen_poses_;
   Slam* slam_ = nullptr;
   std::vector<MappedSession> sessions_;
   std::vector<MatchRow> matches_;

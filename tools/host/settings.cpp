@@ -61,6 +61,7 @@ void visit_settings(C& c, Visit&& visit) {
   visit("collection.odometry.per_m", c.collection.odometry.per_m);
   visit("collection.odometry.base_rad", c.collection.odometry.base_rad);
   visit("collection.odometry.per_m_rad", c.collection.odometry.per_m_rad);
+  visit("collection.odometry.drift_share", c.collection.odometry.drift_share);
   visit("linker.pending", c.collection.linker.pending);
   visit("linker.graph_gate_chi2", c.collection.linker.graph_gate_chi2);
   visit("linker.pair_gate_chi2", c.collection.linker.pair_gate_chi2);

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "host/carmen_log.hpp"
+#include "host/heap_counter.hpp"
 #include "host/map_output.hpp"
 #include "host/mapping_run.hpp"
 #include "host/settings.hpp"
@@ -149,6 +150,7 @@ void run_map(const MapOptions& options) {
     std::fprintf(stderr, "\n");
   }
   figures.total_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  figures.heap_allocations = host::heap_counts().allocations;
   const host::Summary summary = host::write_outputs(run, options.directory, figures);
   std::printf("%llu submaps in %llu component(s), %llu loop and %llu merge edges, %.1f s; map: %s/map.png\n",
               static_cast<unsigned long long>(run.slam().collection().size()),

@@ -18,12 +18,13 @@
 
 namespace mellin {
 
-/// Deviations of an odometry edge between consecutive submaps: what the local mapper drifts between their centres.
+/// Deviations of an odometry edge between consecutive submaps, beside the drift that the local mapper knows of.
 struct OdometryEdgeNoise {
   float base_m = 0.03F;
   float per_m = 0.01F;  ///< times the distance of the centres
   float base_rad = 0.012F;
   float per_m_rad = 0.0005F;  ///< times the distance of the centres
+  float drift_share = 0.5F;   ///< of the local mapper's drift, as a deviation
 };
 
 struct CollectionConfig {
@@ -122,8 +123,9 @@ class MapCollection {
   Status begin_session(const SessionId& id);
 
   /// Takes a submap that was rendered into the slot (header without id and session) and starts to work on it; the
-  /// handle is taken over. Returns its id. busy: step() has not finished with the one before. full: max_submaps.
-  Result<SubmapId> insert(SubmapHeader header, SlotHandle& slot);
+  /// handle is taken over. `drift` is the covariance of the submap's pose against the one before, in its own frame.
+  /// Returns its id. busy: step() has not finished with the one before. full: max_submaps.
+  Result<SubmapId> insert(SubmapHeader header, SlotHandle& slot, const Sym3& drift);
 
   /// Whether step() has nothing to do.
   bool idle() const { return stage_ == Stage::idle; }
@@ -177,7 +179,7 @@ class MapCollection {
   };
 
   void run_slice();
-  void link_odometry(SubmapId id);
+  void link_odometry(SubmapId id, const Sym3& drift);
   void begin_screening();
   void screen_next();
   void finish_screening();

@@ -16,7 +16,7 @@ struct ScreeningConfig {
   std::uint16_t grid_side = 768;  ///< of the submaps
   std::uint32_t max_submaps = 512;
   MatcherConfig matcher;  ///< its side is the digests': grid_side over a power of two
-  VerificationConfig verification;
+  VerificationConfig verification = kDigestVerification;
   std::uint8_t verified = 4;  ///< hypotheses of a pair whose agreement is looked at, strongest peaks first
   /// Keeps each digest's features (spectra) in RAM, some 8 bytes x side^2 each; without, they are made again for each
   /// comparison, which takes about twice the time.
@@ -35,7 +35,6 @@ class SpectralScreening final : public DigestMatcher {
     Matcher::Memory matcher;
     Span<std::uint8_t> classes_a;
     Span<std::uint8_t> classes_b;
-    Span<std::uint8_t> cells;
   };
 
   static constexpr std::size_t digest_size(std::uint16_t side) {
@@ -58,7 +57,6 @@ class SpectralScreening final : public DigestMatcher {
     m.matcher = Matcher::carve(arena, config.matcher);
     m.classes_a = arena.template take<std::uint8_t>(std::size_t{side} * side, Part::spectral);
     m.classes_b = arena.template take<std::uint8_t>(std::size_t{side} * side, Part::spectral);
-    m.cells = arena.template take<std::uint8_t>(std::size_t{side} * side, Part::spectral);
     return m;
   }
   /// Floats of scratch that set_scratch() needs; may be shared with jobs that do not run at the same time.

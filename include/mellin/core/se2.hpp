@@ -79,6 +79,10 @@ inline Sym3 scale(const Sym3& m, double s) { return {m.xx * s, m.xy * s, m.xt * 
 /// order, the two independent).
 Sym3 compose_covariance(const Pose2& a_T_b, const Sym3& cov_ab, const Pose2& b_T_c, const Sym3& cov_bc);
 
+/// A covariance of a small motion of c, given in c's own frame, as the covariance of the small motion of b that moves c
+/// so when the two are rigidly joined at b_T_c; in b's own frame.
+Sym3 carried(const Sym3& cov_c, const Pose2& b_T_c);
+
 /// Covariance of b_T_a from that of a_T_b (first order).
 Sym3 inverse_covariance(const Pose2& a_T_b, const Sym3& cov_ab);
 

@@ -53,8 +53,9 @@ class ParticleMapper final : public LocalMapper {
     ScanMatcher::Memory matcher;
     LiveGrid::Memory grids;
     Span<Particle> particles;
-    Span<Pose2> poses;     ///< particle by particle, a ring by scan number
-    Span<CellRect> rects;  ///< the part of the window that each scan has been continuously inside
+    Span<Pose2> poses;       ///< particle by particle, a ring by scan number
+    Span<CellRect> rects;    ///< the part of the window that each scan has been continuously inside
+    Span<Sym3> covariances;  ///< of the best particle's match, a ring by scan number
   };
   template <class A>
   static constexpr Memory carve(A& arena, const ParticleMapperConfig& config) {
@@ -64,7 +65,8 @@ class ParticleMapper final : public LocalMapper {
             LiveGrid::carve(arena, config.side, config.particles),
             arena.template take<Particle>(config.particles, Part::mapper),
             arena.template take<Pose2>(capacity * config.particles, Part::mapper),
-            arena.template take<CellRect>(std::size_t{config.remembered_scans} * config.particles, Part::mapper)};
+            arena.template take<CellRect>(std::size_t{config.remembered_scans} * config.particles, Part::mapper),
+            arena.template take<Sym3>(capacity, Part::mapper)};
   }
 
   ParticleMapper() = default;
@@ -83,6 +85,7 @@ class ParticleMapper final : public LocalMapper {
     return scans_.end() > config_.remembered_scans ? scans_.end() - config_.remembered_scans : 0;
   }
   Pose2 scan_pose(std::uint32_t number) const override { return poses(best_)[number % pose_capacity()]; }
+  Sym3 scan_covariance(std::uint32_t number) const override { return memory_.covariances[number % pose_capacity()]; }
   const MapperStatistics& statistics() const override { return statistics_; }
 
  private:
@@ -118,6 +121,7 @@ class ParticleMapper final : public LocalMapper {
   std::uint64_t seed_ = 0;
   MapperStatistics statistics_;
   std::size_t best_ = 0;
+  Pose2 motion_;   ///< by odometry, since the last taken scan
   Pose2 tracked_;  ///< live pose at the newest scan, taken or not
   Sym3 tracked_information_;
   Pose2 last_odometry_;   ///< at the newest scan

@@ -49,6 +49,10 @@ class SubmapBuilder {
   /// Freezes the newest scans: takes over their poses and fills in the header (all but id and session). Rendering into
   /// `cells` (side * side) follows in steps. busy: a submap is being rendered. degenerate: no scan was taken.
   Status begin(const LocalMapper& mapper, Span<std::uint8_t> cells, SubmapHeader& header);
+  /// What the local mapper may have drifted between the submap before and this one, as a covariance of this one's pose
+  /// in its own frame: the scans from the middle of the one to the middle of the other, with errors that all point the
+  /// same way, since what a scan does not determine is wrong by the odometry's bias again and again.
+  const Sym3& drift() const { return drift_; }
   /// Renders the next band. Returns true when the grid is complete. not_found: a scan has left the memory meanwhile;
   /// the submap is lost. Cost: band_rows x side cells, and the beams of max_scans scans clipped to them.
   Result<bool> step(const ScanMemory& scans);
@@ -62,6 +66,8 @@ class SubmapBuilder {
 
  private:
   std::uint32_t scans_in_path(const LocalMapper& mapper) const;
+  Sym3 drift_since(const LocalMapper& mapper, const Pose2& session_T_submap, std::uint32_t from,
+                   std::uint32_t to) const;
 
   SubmapBuilderConfig config_;
   Memory memory_;
@@ -76,6 +82,8 @@ class SubmapBuilder {
   double new_path_m_ = 0.0;      ///< since the last submap
   Pose2 last_pose_;
   bool any_frozen_ = false;
+  std::uint32_t middle_ = 0;  ///< number of the scan in the middle of the last submap
+  Sym3 drift_;
 };
 
 }  // namespace mellin
