@@ -17,7 +17,7 @@ constexpr double kWallStep_m = 0.4;  // of a bend's polygon: its corners stand o
 constexpr double kWallBox_m = 0.35;  // depth of what stands at a corridor's wall
 
 /// Streams of random numbers: each part of the floor has its own, so that one does not shift the others.
-enum Stream : std::uint64_t { kRooms = 1, kFurniture = 2, kChange = 1000 };
+enum Stream : std::uint64_t { kRooms = 1, kFurniture = 2, kBends = 3, kChange = 1000 };
 
 double between_limits(Random& random, double low, double high) { return low + (high - low) * random.uniform(); }
 
@@ -39,6 +39,23 @@ void add_bend(Floor& floor, int side) {
       const Pose2 a = ring::centre_line(from + ring::kBend_m * i / steps);
       const Pose2 b = ring::centre_line(from + ring::kBend_m * (i + 1) / steps);
       floor.walls.push_back({transform(a, 0.0, y), transform(b, 0.0, y)});
+    }
+  }
+}
+
+/// What makes a bend's walls more than bare: pilasters at uneven distances, so that every place looks its own way.
+void add_pilasters(Floor& floor, int side, Random& random) {
+  const double from = ring::side_start(side) + ring::side_length(side);
+  for (const double wall : {-ring::kHalfWidth_m, ring::kHalfWidth_m}) {
+    const double inwards = wall < 0.0 ? 1.0 : -1.0;
+    for (double way = between_limits(random, 0.5, 2.0); way < ring::kBend_m - 0.6;
+         way += between_limits(random, 1.2, 3.5)) {
+      const Pose2 frame = ring::centre_line(from + way);
+      const double width = between_limits(random, 0.2, 0.5);
+      const double top = wall + inwards * between_limits(random, 0.15, 0.3);
+      add_wall(floor, frame, 0.0, wall, 0.0, top);
+      add_wall(floor, frame, 0.0, top, width, top);
+      add_wall(floor, frame, width, top, width, wall);
     }
   }
 }
@@ -185,6 +202,7 @@ void check_options(const SimOptions& o, int session) {
   for (const double share : {o.no_return_share, o.outlier_share, o.way_noise}) {
     check(share >= 0.0 && share <= 1.0, "expected shares of 0 to 1");
   }
+  check(o.bare_bends >= 0 && o.bare_bends <= ring::kSides, "expected 0 to 4 bare bends");
   check(o.range_noise_m >= 0.0 && o.range_noise_m <= 1.0, "expected a range noise of 0 to 1 m");
   check(o.turn_noise_rad >= 0.0 && o.turn_noise_rad <= 1.0, "expected a turn noise of 0 to 1 rad");
   check(std::fabs(o.scale_error) <= 0.5, "expected a scale error of -0.5 to 0.5");
@@ -198,8 +216,12 @@ Floor make_floor(const SimOptions& options, int session) {
   Floor floor;
   Random layout(options.seed, kRooms);
   Random furniture(options.seed, kFurniture);
+  Random bends(options.seed, kBends);
   for (int side = 0; side < ring::kSides; ++side) {
     add_bend(floor, side);
+    if (side >= options.bare_bends) {
+      add_pilasters(floor, side, bends);
+    }
     for (const bool core : {false, true}) {
       add_rooms(floor, side, core, layout, furniture);
     }

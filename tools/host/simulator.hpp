@@ -1,7 +1,7 @@
 // A simulated office floor, a robot that drives through it, its laser and its bad odometry: logs with exact truth.
 //
-// The floor is a ring corridor round a core. Four wide bends with smooth, bare walls join four straight stretches with
-// rooms, doors and furniture on both sides. In a bend a laser cannot tell how far along the robot is (an annulus looks
+// The floor is a ring corridor round a core. Four wide bends join four straight stretches with rooms, doors and furniture
+// on both sides. One bend or more have smooth, bare walls. In such a bend a laser cannot tell how far along the robot is (an annulus looks
 // the same everywhere), and moving along it turns the robot, so that the odometry's scale error becomes an error of
 // heading there that no scan matcher corrects: only recognising a place does.
 //
@@ -21,7 +21,8 @@ struct SimOptions {
   std::uint64_t seed = 1;
   int sessions = 1;             ///< logs of the same floor: each starts elsewhere, in an odometry frame of its own
   double change = 0.0;          ///< share of the furniture and the doors that is changed from each session to the next
-  int loops = 2;                ///< times round the ring in a session
+  int bare_bends = 1;           ///< bends with smooth walls, 0 to 4; the others have pilasters
+  int loops = 4;                ///< times round the ring in a session
   int beams = 180;              ///< 180 (1 degree apart) or 360 (half a degree), the first at -90 degrees
   double range_m = 8.0;         ///< reach of the laser
   double spacing_m = 0.2;       ///< path between scans

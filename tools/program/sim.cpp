@@ -35,6 +35,7 @@ void add_sim(CLI::App& app) {
   command->add_option("--seed", o.seed, "of the floor, the drive and the noise")->capture_default_str();
   number("--sessions", o.sessions, "logs; each starts elsewhere", 1, 100);
   number("--change", o.change, "share of furniture and doors changed between sessions", 0, 1);
+  number("--bare-bends", o.bare_bends, "bends of the ring with smooth walls", 0, 4);
   number("--loops", o.loops, "times round the ring in a session", 1, 50);
   command->add_option("--beams", o.beams, "of a scan: 180 or 360 over 180 degrees")
       ->check(CLI::IsMember({180, 360}))
