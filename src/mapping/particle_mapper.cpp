@@ -137,7 +137,8 @@ bool ParticleMapper::take(const Pose2& predicted, const Sym3& prior) {
   // Over the whole way since the last taken scan: where neither this match nor those on the way determined the pose,
   // odometry did.
   const Sym3 way = prior_information(motion_);
-  const Sym3 information = tracked_information_ + scale(prior, -1.0) + way;
+  const double gain = wide(config_.scan_information_gain);
+  const Sym3 information = scale(tracked_information_ + scale(prior, -1.0), gain) + way;
   if (!invert(information, memory_.covariances[number % pose_capacity()])) {
     (void)invert(way, memory_.covariances[number % pose_capacity()]);
   }

@@ -29,6 +29,7 @@ void visit_settings(C& c, Visit&& visit) {
   visit("mapper.take_angle_rad", c.mapper.take_angle_rad);
   visit("mapper.resample_share", c.mapper.resample_share);
   visit("mapper.proposal_spread", c.mapper.proposal_spread);
+  visit("mapper.scan_information_gain", c.mapper.scan_information_gain);
   visit("mapper.noise.distance_base_m", c.mapper.noise.distance_base_m);
   visit("mapper.noise.distance_per_m", c.mapper.noise.distance_per_m);
   visit("mapper.noise.distance_per_rad", c.mapper.noise.distance_per_rad);
