@@ -249,7 +249,7 @@ void Alignment::stamp_distance(const Point2f& obstacle) {
       const float squared = dx * dx + dy * dy;
       const float rounded_up = static_cast<float>(cells[column]) - 0.5F;
       if (squared < rounded_up * rounded_up) {
-        cells[column] = static_cast<std::uint8_t>(sqrt(squared) + 0.5F);
+        cells[column] = static_cast<std::uint8_t>(std::floor(sqrt(squared) + 0.5F));
       }
     }
   }

@@ -145,7 +145,8 @@ class Pair {
   std::vector<Candidate> hypotheses() {
     MatcherConfig config;
     config.side = sides_.pixels;
-    config.pixel_m = a_.cell_m * static_cast<float>(sides_.cells / sides_.pixels);
+    const int cells_a_pixel = sides_.cells / sides_.pixels;
+    config.pixel_m = a_.cell_m * static_cast<float>(cells_a_pixel);
     Memory matcher_memory;
     Memory memory_a;
     Memory memory_b;
