@@ -41,6 +41,11 @@ std::optional<StoredLine> parse_stored(const std::string& line) {
   return crc.ec == std::errc() && crc.ptr == end ? std::optional(stored) : std::nullopt;
 }
 
+[[noreturn]] void refuse_line(const std::string& path, int number, const std::string& line) {
+  throw std::runtime_error(path + ":" + std::to_string(number) +
+                           ": expected an id and a checksum of eight hexadecimal digits, found: " + line);
+}
+
 }  // namespace
 
 ImageStore::ImageStore(const std::string& path)
@@ -107,7 +112,7 @@ Status ImageStore::read_blob(BlobKind kind, std::uint32_t id, std::vector<std::u
 
 std::string to_string(const StoredLine& line) {
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%u %08x", line.id, line.crc32);
+  static_cast<void>(std::snprintf(text.data(), text.size(), "%u %08x", line.id, line.crc32));
   return text.data();
 }
 
@@ -122,8 +127,7 @@ std::vector<StoredLine> read_stored(const std::string& path) {
     if (const std::optional<StoredLine> stored = parse_stored(line)) {
       lines.push_back(*stored);
     } else if (!in.eof()) {
-      throw std::runtime_error(path + ":" + std::to_string(number) +
-                               ": expected an id and a checksum of eight hexadecimal digits, found: " + line);
+      refuse_line(path, number, line);
     }
   }
   return lines;
