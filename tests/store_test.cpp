@@ -2,6 +2,7 @@
 #include <zlib.h>
 
 #include <algorithm>
+#include <limits>
 #include <string>
 
 #include "mellin/store/crc32.hpp"
@@ -336,7 +337,7 @@ TEST_CASE("geometries that contradict themselves are refused") {
   CHECK(TestStore(small_config(), bad).init_status == Status::invalid_config);
   CHECK(TestStore(small_config(63), flash.flash()).init_status == Status::invalid_config);
   StoreConfig config = small_config();
-  config.cell_m = NAN;
+  config.cell_m = std::numeric_limits<float>::quiet_NaN();
   CHECK(TestStore(config, flash.flash()).init_status == Status::invalid_config);
 }
 
@@ -362,7 +363,7 @@ TEST_CASE("invalid puts are refused") {
   REQUIRE(t.store.begin_group({1, 1, 10}) == Status::ok);
   CHECK(t.store.begin_group({1, 1, 10}) == Status::busy);
   SubmapHeader header = sample_header(1);
-  header.session_T_submap.x = NAN;
+  header.session_T_submap.x = std::numeric_limits<double>::quiet_NaN();
   CHECK(t.store.put_submap(header, grid) == Status::invalid_argument);
   const GridView small{Span<const std::uint8_t>(cells.data(), 1024), 32, 0.05F};
   CHECK(t.store.put_submap(sample_header(1), small) == Status::invalid_argument);

@@ -1,6 +1,5 @@
 #include "mellin/store/flash_log.hpp"
 
-#include <cassert>
 #include <cstring>
 
 #include "mellin/store/crc32.hpp"
@@ -24,8 +23,6 @@ bool geometry_fits(const mellin_flash& flash, std::size_t page_bytes) {
          is_power_of_two(flash.program_unit) && flash.program_unit <= kMaxProgramUnit && is_power_of_two(page_bytes) &&
          page_bytes % flash.program_unit == 0 && flash.block_size % page_bytes == 0;
 }
-
-bool same_float(float a, float b) { return std::memcmp(&a, &b, sizeof a) == 0; }
 
 }  // namespace
 
@@ -169,8 +166,8 @@ Status FlashLog::check_identity(const BlockHeader& header) const {
                                              << flash_.block_count << " of " << flash_.block_size);
     return Status::version_mismatch;
   }
-  const bool config = header.fingerprint == identity_.fingerprint && header.side == identity_.side &&
-                      same_float(header.cell_m, identity_.cell_m);
+  const bool config =
+      header.fingerprint == identity_.fingerprint && header.side == identity_.side && header.cell_m == identity_.cell_m;
   if (!config) {
     log_.write(MELLIN_LOG_WARNING, LogLine() << "store: the flash belongs to configuration " << header.fingerprint
                                              << ", side " << std::uint32_t{header.side} << ", this is "

@@ -30,7 +30,7 @@ class LibraryCall {
 
 // For the hooks only.
 void announce_heap_hooks();
-void note_allocation(std::uint64_t bytes);
+void note_allocation(std::uint64_t size);
 void note_free();
 
 }  // namespace mellin::host

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cstdio>
 #include <fstream>
-#include <regex>
+#include <optional>
 #include <stdexcept>
 
 namespace mellin::host {
@@ -26,6 +27,23 @@ StoreConfig config_of(const posix::ImageInfo& info) {
   config.grid_slots = 1;
   config.page_bytes = static_cast<std::uint16_t>(std::clamp(info.geometry.program_unit, 1U, 2048U));
   return config;
+}
+
+std::optional<StoredLine> parse_stored(const std::string& line) {
+  constexpr std::ptrdiff_t kDigits = 8;
+  StoredLine stored;
+  const char* const end = line.data() + line.size();
+  const auto id = std::from_chars(line.data(), end, stored.id);
+  if (id.ec != std::errc() || end - id.ptr != kDigits + 1 || *id.ptr != ' ') {
+    return std::nullopt;
+  }
+  const auto crc = std::from_chars(id.ptr + 1, end, stored.crc32, 16);
+  return crc.ec == std::errc() && crc.ptr == end ? std::optional(stored) : std::nullopt;
+}
+
+[[noreturn]] void refuse_line(const std::string& path, int number, const std::string& line) {
+  throw std::runtime_error(path + ":" + std::to_string(number) +
+                           ": expected an id and a checksum of eight hexadecimal digits, found: " + line);
 }
 
 }  // namespace
@@ -94,7 +112,7 @@ Status ImageStore::read_blob(BlobKind kind, std::uint32_t id, std::vector<std::u
 
 std::string to_string(const StoredLine& line) {
   std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%u %08x", line.id, line.crc32);
+  static_cast<void>(std::snprintf(text.data(), text.size(), "%u %08x", line.id, line.crc32));
   return text.data();
 }
 
@@ -103,17 +121,13 @@ std::vector<StoredLine> read_stored(const std::string& path) {
   if (!in) {
     throw std::runtime_error(path + ": cannot be opened");
   }
-  const std::regex form("([0-9]{1,9}|[1-3][0-9]{9}|4[0-1][0-9]{8}) ([0-9a-fA-F]{8})");
   std::vector<StoredLine> lines;
   std::string line;
   for (int number = 1; std::getline(in, line); ++number) {
-    std::smatch match;
-    if (std::regex_match(line, match, form)) {
-      lines.push_back(
-          {static_cast<SubmapId>(std::stoul(match[1])), static_cast<std::uint32_t>(std::stoul(match[2], nullptr, 16))});
+    if (const std::optional<StoredLine> stored = parse_stored(line)) {
+      lines.push_back(*stored);
     } else if (!in.eof()) {
-      throw std::runtime_error(path + ":" + std::to_string(number) +
-                               ": expected an id and a checksum of eight hexadecimal digits, found: " + line);
+      refuse_line(path, number, line);
     }
   }
   return lines;

@@ -134,13 +134,13 @@ std::string csv_row(const SubmapHeader& h, std::uint32_t bytes, std::uint32_t cr
   std::string session;
   std::array<char, 400> text{};
   for (const std::uint8_t byte : h.session.bytes) {
-    std::snprintf(text.data(), text.size(), "%02x", unsigned{byte});
+    static_cast<void>(std::snprintf(text.data(), text.size(), "%02x", unsigned{byte}));
     session += text.data();
   }
-  std::snprintf(text.data(), text.size(), "%u,%s,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%lld,%u,%u,%u,%08x\n", h.id,
-                session.c_str(), h.session_T_submap.x, h.session_T_submap.y, h.session_T_submap.theta,
-                h.submap_T_robot.x, h.submap_T_robot.y, h.submap_T_robot.theta, static_cast<long long>(h.stamp_us),
-                h.first_scan, h.scan_count, bytes, crc);
+  static_cast<void>(std::snprintf(
+      text.data(), text.size(), "%u,%s,%.9g,%.9g,%.9g,%.9g,%.9g,%.9g,%lld,%u,%u,%u,%08x\n", h.id, session.c_str(),
+      h.session_T_submap.x, h.session_T_submap.y, h.session_T_submap.theta, h.submap_T_robot.x, h.submap_T_robot.y,
+      h.submap_T_robot.theta, static_cast<long long>(h.stamp_us), h.first_scan, h.scan_count, bytes, crc));
   return text.data();
 }
 

@@ -75,7 +75,7 @@ class FlashLog {
   /// Bytes that a record may take in the open block, header included; 0 where no block is open.
   std::uint32_t room() const;
   /// Erases the next block in the ring and makes it the open one; a block that cannot be erased is passed over.
-  /// Statuses: ok; full where only the spare block is left; device_error.
+  /// Statuses: ok; full where only the spare block is left; not_found where nothing is mounted; device_error.
   Status open_block();
   /// Appends a record; `header`'s length and checksum are filled in here. Requires kRecordHeaderBytes + payload.size()
   /// <= room(), else invalid_argument. Programs whole pages as they fill. Other statuses: ok; device_error, after which
