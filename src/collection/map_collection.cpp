@@ -72,9 +72,8 @@ void MapCollection::link_odometry(SubmapId id, const Sym3& drift) {
   const double distance = translation(step);
   const double m = static_cast<double>(noise.base_m) + static_cast<double>(noise.per_m) * distance;
   const double rad = static_cast<double>(noise.base_rad) + static_cast<double>(noise.per_m_rad) * distance;
-  const auto share = static_cast<double>(noise.drift_share);
   Sym3 information;
-  if (!invert(diagonal(m * m, m * m, rad * rad) + scale(drift, share * share), information)) {
+  if (!invert(diagonal(m * m, m * m, rad * rad) + drift, information)) {
     information = diagonal(1.0 / (m * m), 1.0 / (m * m), 1.0 / (rad * rad));
   }
   const Result<EdgeId> edge = graph_.add_edge(newest_, id, EdgeKind::odometry, step, information);

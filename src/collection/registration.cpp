@@ -147,9 +147,9 @@ void SpectralRegistration::finish_alignment() {
     if (!known && agreement.ok() && invert(r.information + diagonal(1e-6, 1e-6, 1e-6), in_b)) {
       candidate.a_T_b = r.a_T_b;
       candidate.covariance = rotate(in_b, r.a_T_b.theta);
-      candidate.agreement = agreement.value().score;
-      candidate.overlap = agreement.value().overlap;
       candidate.inlier_share = r.inlier_share;
+      candidate.agreement = agreement.value().score * r.inlier_share;
+      candidate.overlap = agreement.value().overlap;
       insert_by_agreement(hypotheses_, candidate);
     }
   }

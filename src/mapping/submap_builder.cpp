@@ -9,28 +9,44 @@ void SubmapBuilder::reset() {
   new_scans_ = 0;
   path_m_ = 0.0;
   new_path_m_ = 0.0;
+  new_drift_ = Sym3{};
 }
 
-bool SubmapBuilder::scan_taken(const Pose2& session_T_base) {
-  const double step = taken_ == 0 ? 0.0 : translation(between(last_pose_, session_T_base));
-  last_pose_ = session_T_base;
+bool SubmapBuilder::scan_taken(const LocalMapper& mapper) {
+  const std::uint32_t newest = mapper.scans().end() - 1;
+  const Pose2 pose = mapper.scan_pose(newest);
+  const double step = taken_ == 0 ? 0.0 : translation(between(last_pose_, pose));
+  last_pose_ = pose;
   ++taken_;
   ++new_scans_;
   path_m_ += step;
   new_path_m_ += step;
+  new_drift_ = new_drift_ + mapper.scan_covariance(newest);
+  const bool uncertain = new_scans_ >= config_.min_scans && too_uncertain(scale(new_drift_, new_scans_));
   if (!any_frozen_) {
-    return taken_ >= config_.max_scans || path_m_ >= static_cast<double>(config_.max_path_m);
+    return uncertain || taken_ >= config_.max_scans || path_m_ >= static_cast<double>(config_.max_path_m);
   }
-  return new_scans_ >= config_.every_scans || new_path_m_ >= static_cast<double>(config_.every_path_m);
+  return uncertain || new_scans_ >= config_.every_scans || new_path_m_ >= static_cast<double>(config_.every_path_m);
 }
 
-std::uint32_t SubmapBuilder::scans_in_path(const LocalMapper& mapper) const {
+bool SubmapBuilder::too_uncertain(const Sym3& drift) const {
+  const double share = static_cast<double>(config_.drift_share) * static_cast<double>(config_.drift_share);
+  const double m = static_cast<double>(config_.max_drift_m);
+  const double rad = static_cast<double>(config_.max_drift_rad);
+  return share * drift.xx > m * m || share * drift.yy > m * m || share * drift.tt > rad * rad;
+}
+
+std::uint32_t SubmapBuilder::scans_in_reach(const LocalMapper& mapper) const {
   const std::uint32_t end = mapper.scans().end();
   std::uint32_t count = 1;
   double path = 0.0;
+  Sym3 drift;
   while (count < config_.max_scans && end - count > mapper.first_remembered()) {
-    path += translation(between(mapper.scan_pose(end - count - 1), mapper.scan_pose(end - count)));
-    if (path > static_cast<double>(config_.max_path_m)) {
+    const std::uint32_t next = end - count;
+    path += translation(between(mapper.scan_pose(next - 1), mapper.scan_pose(next)));
+    drift = drift + mapper.scan_covariance(next);
+    if (path > static_cast<double>(config_.max_path_m) ||
+        (count >= config_.min_scans && too_uncertain(scale(drift, count)))) {
       break;
     }
     ++count;
@@ -46,7 +62,7 @@ Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells,
   if (end == 0) {
     return Status::degenerate;
   }
-  scan_count_ = scans_in_path(mapper);
+  scan_count_ = scans_in_reach(mapper);
   first_scan_ = end - scan_count_;
   Pose2 low = mapper.scan_pose(first_scan_);
   Pose2 high = low;
@@ -73,6 +89,7 @@ Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells,
   any_frozen_ = true;
   new_scans_ = 0;
   new_path_m_ = 0.0;
+  new_drift_ = Sym3{};
   return Status::ok;
 }
 
@@ -86,7 +103,8 @@ Sym3 SubmapBuilder::drift_since(const LocalMapper& mapper, const Pose2& session_
     sum = sum + carried(mapper.scan_covariance(number), submap_T_robot);
     ++count;
   }
-  return scale(sum, count);
+  const double share = static_cast<double>(config_.drift_share);
+  return scale(sum, share * share * count);
 }
 
 Result<bool> SubmapBuilder::step(const ScanMemory& scans) {

@@ -91,7 +91,7 @@ Result<ScanOutcome> Slam::add(const Scan& scan) {
   const std::uint64_t before = now_us();
   const Result<ScanOutcome> outcome = mapper_.add(scan);
   if (outcome.ok() && outcome.value().taken) {
-    freeze_if_due(builder_.scan_taken(outcome.value().session_T_base));
+    freeze_if_due(builder_.scan_taken(mapper_));
   }
   statistics_.mapping_us += now_us() - before;
   return outcome;

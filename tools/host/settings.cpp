@@ -46,6 +46,10 @@ void visit_settings(C& c, Visit&& visit) {
   visit("submaps.max_path_m", c.submaps.max_path_m);
   visit("submaps.every_scans", c.submaps.every_scans);
   visit("submaps.every_path_m", c.submaps.every_path_m);
+  visit("submaps.drift_share", c.submaps.drift_share);
+  visit("submaps.max_drift_m", c.submaps.max_drift_m);
+  visit("submaps.max_drift_rad", c.submaps.max_drift_rad);
+  visit("submaps.min_scans", c.submaps.min_scans);
   visit("submaps.band_rows", c.submaps.band_rows);
   visit("screening.peak_share", c.screening.matcher.peak_share);
   visit("screening.max_peaks", c.screening.matcher.max_peaks);
@@ -62,7 +66,6 @@ void visit_settings(C& c, Visit&& visit) {
   visit("collection.odometry.per_m", c.collection.odometry.per_m);
   visit("collection.odometry.base_rad", c.collection.odometry.base_rad);
   visit("collection.odometry.per_m_rad", c.collection.odometry.per_m_rad);
-  visit("collection.odometry.drift_share", c.collection.odometry.drift_share);
   visit("linker.pending", c.collection.linker.pending);
   visit("linker.graph_gate_chi2", c.collection.linker.graph_gate_chi2);
   visit("linker.pair_gate_chi2", c.collection.linker.pair_gate_chi2);

@@ -24,7 +24,6 @@ struct OdometryEdgeNoise {
   float per_m = 0.01F;  ///< times the distance of the centres
   float base_rad = 0.012F;
   float per_m_rad = 0.0005F;  ///< times the distance of the centres
-  float drift_share = 0.5F;   ///< of the local mapper's drift, as a deviation
 };
 
 struct CollectionConfig {

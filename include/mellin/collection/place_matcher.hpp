@@ -18,7 +18,7 @@ struct PlaceHypothesis {
   Pose2 a_T_b;
   Sym3 covariance;            ///< of a_T_b over (x, y in a's frame, theta); from registration only
   float peak = 0.0F;          ///< strength of the match, 0 to 1
-  float agreement = 0.0F;     ///< of what both observed, 0 to 1
+  float agreement = 0.0F;     ///< of what both observed, 0 to 1; after registration times inlier_share
   float overlap = 0.0F;       ///< shared observed area over the smaller one
   float inlier_share = 0.0F;  ///< of the aligned points; from registration only
 };

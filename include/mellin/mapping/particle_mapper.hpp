@@ -33,10 +33,10 @@ struct ParticleMapperConfig {
   float take_angle_rad = 0.523598776F;  ///< … or so much turn since the last taken one
   float resample_share = 0.5F;          ///< resample when the effective number of particles falls below this share
   float proposal_spread = 0.3F;         ///< share of the match's standard deviation that sampling uses
-  /// What a match is worth for the covariance of a scan, against its weight in the search. The search weighs a beam as if
-  /// its end were known to 0.1 m or so, which lets a prior hold it where walls are smooth; it is known to 0.03 m.
+  /// What a match is worth for the covariance of a scan, against its weight in the search. The search weighs a beam as
+  /// if its end were known to 0.1 m or so, which lets a prior hold it where walls are smooth; it is known to 0.03 m.
   float scan_information_gain = 10.0F;
-  std::uint16_t max_beams = 0;          ///< of any laser
+  std::uint16_t max_beams = 0;  ///< of any laser
   ScanMatcherConfig matcher;
   MotionNoise noise;
 };

@@ -17,7 +17,15 @@ struct SubmapBuilderConfig {
   float max_path_m = 20.0F;      ///< … that lie within so much driven path: what is longer warps, and leaves the grid
   std::uint16_t every_scans = 10;  ///< a submap is due after so many new scans (the paper's K/4) …
   float every_path_m = 10.0F;      ///< … or so much path: half of max_path_m keeps neighbours overlapping
-  std::uint16_t side = 768;        ///< cells of the grid; even
+  /// Nor may a submap hold more scans than the local mapper is sure of: those along a featureless stretch are placed by
+  /// odometry, and a rigid grid that spans it would hold its error for good. Deviations from the newest scan to the
+  /// oldest.
+  float max_drift_m = 0.25F;
+  float max_drift_rad = 0.03F;
+  std::uint16_t min_scans = 6;  ///< rendered all the same, however uncertain
+  /// Share of a scan's deviation that points the same way scan after scan, since it comes from the odometry's bias.
+  float drift_share = 0.5F;
+  std::uint16_t side = 768;  ///< cells of the grid; even
   float cell_m = 0.05F;
   std::uint16_t band_rows = 32;  ///< rows rendered in one slice; memory in proportion
 };
@@ -40,9 +48,9 @@ class SubmapBuilder {
 
   /// A new session: counts path and scans from here.
   void reset();
-  /// To be told of each taken scan. Returns whether a submap is due: the memory has been filled once (with scans or
-  /// with path), and since the last submap enough is new.
-  bool scan_taken(const Pose2& session_T_base);
+  /// To be told of each taken scan, the mapper's newest. Returns whether a submap is due: the memory has been filled
+  /// once (with scans, path or drift), and since the last submap enough is new.
+  bool scan_taken(const LocalMapper& mapper);
   /// Whether scans were taken that no submap holds yet.
   bool has_unfrozen() const { return new_scans_ > 0; }
 
@@ -65,7 +73,8 @@ class SubmapBuilder {
   Span<const Pose2> submap_T_scan() const { return memory_.poses.first(scan_count_); }
 
  private:
-  std::uint32_t scans_in_path(const LocalMapper& mapper) const;
+  std::uint32_t scans_in_reach(const LocalMapper& mapper) const;
+  bool too_uncertain(const Sym3& drift) const;
   Sym3 drift_since(const LocalMapper& mapper, const Pose2& session_T_submap, std::uint32_t from,
                    std::uint32_t to) const;
 
@@ -79,6 +88,7 @@ class SubmapBuilder {
   std::uint32_t taken_ = 0;      ///< scans of the session
   std::uint32_t new_scans_ = 0;  ///< since the last submap
   double path_m_ = 0.0;          ///< of the session
+  Sym3 new_drift_;               ///< since the last submap
   double new_path_m_ = 0.0;      ///< since the last submap
   Pose2 last_pose_;
   bool any_frozen_ = false;
