@@ -105,7 +105,8 @@ Result<ScanOutcome> ParticleMapper::add(const Scan& scan) {
   ScanOutcome outcome;
   outcome.taken = first || translation(since_taken) >= wide(config_.take_distance_m) ||
                   magnitude(since_taken.theta) >= wide(config_.take_angle_rad);
-  const Sym3 prior = prior_information(motion);
+  // The matches on the way from the last taken scan leaned on the odometry, too: it errs over the whole way.
+  const Sym3 prior = prior_information(since_taken);
   if (outcome.taken) {
     taken_odometry_ = scan.odom_T_base;
     motion_ = since_taken;

@@ -4,7 +4,7 @@ namespace mellin {
 namespace {
 
 constexpr std::int32_t kSearchStep = 2;  // cells: within the reach of the field
-constexpr float kInlierField = 0.4F;     // the field one to two cells from something solid
+constexpr float kInlierField = 0.1F;  // the field beside something that was hit a few times
 
 /// The field between the centres of four cells, 0 to 1, and its slope per cell.
 struct Sample {
