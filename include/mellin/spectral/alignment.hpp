@@ -21,7 +21,7 @@ namespace mellin {
 
 struct AlignmentConfig {
   std::uint16_t max_side = 768;       ///< cells; the largest grid that begin() takes (a byte each)
-  std::uint16_t max_points = 4096;    ///< obstacle points used, spread evenly when there are more (16 bytes each)
+  std::uint16_t max_points = 2048;    ///< obstacle points used, spread evenly when there are more (16 bytes each)
   std::uint16_t rows_per_step = 32;   ///< grid rows that one step() works on while it builds the field or the points
   std::uint16_t max_iterations = 64;  ///< each way
   std::uint8_t occupied_from = 64;    ///< a cell is an obstacle from this many 254ths of hits per observation on
