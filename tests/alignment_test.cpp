@@ -164,6 +164,37 @@ TEST_CASE("alignment does not depend on the size of its slices") {
   CHECK(whole.value().converged);
 }
 
+TEST_CASE("alignment does not depend on what it keeps from one hypothesis or pair to the next") {
+  const std::vector<host::PosedScan> scans = test::simulated_scans(3);
+  const host::RenderedSubmap a = test::submap(scans, 0, 20, 2, 0.4);
+  const host::RenderedSubmap b = test::submap(scans, 1, 20, 2, -1.0);
+  const host::RenderedSubmap other = test::submap(scans, 60, 20, 2, 2.0);
+  const Pose2 start = compose(between(a.world_T_submap, b.world_T_submap), {0.1, 0.1, 0.02});
+  const Result<AlignmentResult> fresh = Bench().align(a.view(), b.view(), start);
+  REQUIRE(fresh.ok());
+  for (const bool keep_both : {true, false}) {
+    AlignmentConfig config;
+    config.keep_both = keep_both;
+    Bench bench(config);
+    Alignment& alignment = bench.alignment;
+    const auto run = [&alignment](const Pose2& a_T_b) {
+      REQUIRE(alignment.begin(a_T_b) == Status::ok);
+      while (alignment.step()) {
+      }
+      return alignment.result();
+    };
+    REQUIRE(alignment.set_b(b.view()) == Status::ok);
+    REQUIRE(alignment.set_a(other.view()) == Status::ok);
+    (void)run({1.0, 2.0, 0.5});
+    REQUIRE(alignment.set_a(a.view()) == Status::ok);
+    (void)run(compose(start, {0.3, 0.0, 0.1}));
+    const Result<AlignmentResult> kept = run(start);
+    REQUIRE(kept.ok());
+    CHECK(std::memcmp(&fresh.value().a_T_b, &kept.value().a_T_b, sizeof(Pose2)) == 0);
+    CHECK(std::memcmp(&fresh.value().information, &kept.value().information, sizeof(Sym3)) == 0);
+  }
+}
+
 TEST_CASE("a wrong place shows in the evidence") {
   const std::vector<host::PosedScan> scans = test::simulated_scans(3);
   const host::RenderedSubmap a = test::submap(scans, 0, 20, 2, 0.4);

@@ -117,6 +117,7 @@ constexpr Config micro_profile() {
   c.submaps.band_rows = 16;
   c.screening.cache_features = false;
   c.registration.alignment.max_points = 1024;
+  c.registration.alignment.keep_both = false;
   c.collection.graph.max_edges = 512;
   c.collection.graph.max_fill = 1024;
   c.collection.linker.pending = 32;

@@ -197,6 +197,7 @@ void MapCollection::screen_next() {
     ++other_;
   }
   if (other_ >= newest) {
+    (void)grids_->set_query(store_->slots().view(slot_));  // begin() refuses without
     stage_ = Stage::choose;
     return;
   }
@@ -288,8 +289,7 @@ void MapCollection::begin_registration() {
     return;
   }
   other_slot_ = static_cast<SlotHandle&&>(slot.value());
-  const GridSlots& slots = store_->slots();
-  if (grids_->begin(slots.view(other_slot_), slots.view(slot_)) == Status::ok) {
+  if (grids_->begin(store_->slots().view(other_slot_)) == Status::ok) {
     stage_ = Stage::registering;
   } else {
     (void)store_->slots().release(other_slot_);

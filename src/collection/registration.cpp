@@ -23,7 +23,7 @@ Status SpectralRegistration::init(const RegistrationConfig& config, const Memory
   memory_ = memory;
   scratch_ = scratch;
   if (config.aligned < 1 || config.aligned > kMaxPlaceHypotheses || config.class_side == 0 ||
-      config.grid_side % config.class_side != 0) {
+      config.grid_side % config.class_side != 0 || !(config.aligned_share >= 0.0F) || !(config.aligned_share <= 1.0F)) {
     return Status::invalid_config;
   }
   if (scratch.size() < scratch_size(config)) {
@@ -33,15 +33,25 @@ Status SpectralRegistration::init(const RegistrationConfig& config, const Memory
   return matcher != Status::ok ? matcher : alignment_.init(alignment_config(config), memory.alignment);
 }
 
-Status SpectralRegistration::begin(const GridView& a, const GridView& b) {
+Status SpectralRegistration::set_query(const GridView& b) {
+  hypotheses_.clear();
+  stage_ = Stage::idle;
+  query_ready_ = false;
+  const bool valid = b.side == config_.grid_side && alignment_.set_b(b) == Status::ok;
+  b_ = valid ? b : GridView{};
+  return valid ? Status::ok : Status::invalid_argument;
+}
+
+Status SpectralRegistration::begin(const GridView& a) {
   hypotheses_.clear();
   candidates_.clear();
-  a_ = a;
-  b_ = b;
-  if (a.side != config_.grid_side || b.side != config_.grid_side) {
+  stage_ = Stage::idle;
+  if (b_.side == 0 || a.side != config_.grid_side || alignment_.set_a(a) != Status::ok) {
     return Status::invalid_argument;
   }
-  return begin_picture(a, Stage::picture_a) ? Status::ok : Status::invalid_argument;
+  a_ = a;
+  const bool begun = query_ready_ ? begin_picture(a_, Stage::picture_a) : begin_picture(b_, Stage::picture_b);
+  return begun ? Status::ok : Status::invalid_argument;
 }
 
 bool SpectralRegistration::begin_picture(const GridView& grid, Stage stage) {
@@ -57,16 +67,6 @@ bool SpectralRegistration::step() {
   switch (stage_) {
     case Stage::idle:
       return true;
-    case Stage::picture_a:
-      if (maker_.step(kLinesPerStep)) {
-        begin_extract(memory_.features_a, Stage::extract_a);
-      }
-      break;
-    case Stage::extract_a:
-      if (matcher_.step()) {
-        (void)begin_picture(b_, Stage::picture_b);
-      }
-      break;
     case Stage::picture_b:
       if (maker_.step(kLinesPerStep)) {
         begin_extract(memory_.features_b, Stage::extract_b);
@@ -74,26 +74,31 @@ bool SpectralRegistration::step() {
       break;
     case Stage::extract_b:
       if (matcher_.step()) {
+        stage_ = Stage::classify_b;
+      }
+      break;
+    case Stage::classify_b:
+      classify_query();
+      break;
+    case Stage::picture_a:
+      if (maker_.step(kLinesPerStep)) {
+        begin_extract(memory_.features_a, Stage::extract_a);
+      }
+      break;
+    case Stage::extract_a:
+      if (matcher_.step()) {
         stage_ =
             matcher_.begin_match(memory_.features_a, memory_.features_b) == Status::ok ? Stage::match : Stage::idle;
       }
       break;
     case Stage::match:
       if (matcher_.step()) {
-        stage_ = matcher_.hypotheses().empty() ? Stage::idle : Stage::classify;
+        stage_ = matcher_.hypotheses().empty() ? Stage::idle : Stage::classify_a;
       }
       break;
-    case Stage::classify: {
-      const Result<ClassView> a = classify(a_, config_.verification, config_.class_side, memory_.classes_a);
-      const Result<ClassView> b = classify(b_, config_.verification, config_.class_side, memory_.classes_b);
-      next_ = 0;
-      stage_ = a.ok() && b.ok() ? Stage::verify : Stage::idle;
-      if (stage_ == Stage::verify) {
-        class_a_ = a.value();
-        class_b_ = b.value();
-      }
+    case Stage::classify_a:
+      classify_other();
       break;
-    }
     case Stage::verify:
       verify_candidate();
       break;
@@ -104,6 +109,24 @@ bool SpectralRegistration::step() {
       break;
   }
   return stage_ == Stage::idle;
+}
+
+void SpectralRegistration::classify_query() {
+  const Result<ClassView> classes = classify(b_, config_.verification, config_.class_side, memory_.classes_b);
+  query_ready_ = classes.ok();
+  class_b_ = classes.ok() ? classes.value() : ClassView{};
+  if (query_ready_) {
+    (void)begin_picture(a_, Stage::picture_a);
+  } else {
+    stage_ = Stage::idle;
+  }
+}
+
+void SpectralRegistration::classify_other() {
+  const Result<ClassView> classes = classify(a_, config_.verification, config_.class_side, memory_.classes_a);
+  class_a_ = classes.ok() ? classes.value() : ClassView{};
+  next_ = 0;
+  stage_ = classes.ok() ? Stage::verify : Stage::idle;
 }
 
 void SpectralRegistration::verify_candidate() {
@@ -126,8 +149,12 @@ void SpectralRegistration::verify_candidate() {
 
 void SpectralRegistration::begin_alignment() {
   stage_ = Stage::idle;
-  if (next_ < candidates_.size() && next_ < config_.aligned &&
-      alignment_.begin(a_, b_, candidates_[next_].a_T_b) == Status::ok) {
+  if (next_ >= candidates_.size() || next_ >= config_.aligned) {
+    return;
+  }
+  const float agreement = candidates_[next_].agreement;
+  if (agreement >= config_.aligned_from && agreement >= config_.aligned_share * candidates_[0].agreement &&
+      alignment_.begin(candidates_[next_].a_T_b) == Status::ok) {
     stage_ = Stage::align;
   }
 }

@@ -7,14 +7,26 @@ namespace {
 
 constexpr int kReach = 2;  // cells over which the field falls off
 
-/// round(255 exp(-d^2 / (2 1.5^2))) for d^2 = dx^2 + dy^2.
-constexpr std::uint8_t kFallOff[9] = {255, 204, 164, 0, 105, 84, 0, 0, 43};
+/// The field by squared distance and solidity.
+struct FieldValues {
+  std::uint8_t of[9][16] = {};
+};
+constexpr FieldValues field_values() {
+  // round(255 exp(-d^2 / (2 1.5^2))) for d^2 = dx^2 + dy^2.
+  constexpr std::uint8_t kFallOff[9] = {255, 204, 164, 0, 105, 84, 0, 0, 43};
+  FieldValues values;
+  for (unsigned d2 = 0; d2 < 9; ++d2) {
+    for (unsigned solidity = 0; solidity < 16; ++solidity) {
+      values.of[d2][solidity] = static_cast<std::uint8_t>(kFallOff[d2] * solidity / 15U);
+    }
+  }
+  return values;
+}
+constexpr FieldValues kFieldValues = field_values();
 
 }  // namespace
 
-std::uint8_t field_value(std::uint8_t solidity, int dx, int dy) {
-  return static_cast<std::uint8_t>(static_cast<unsigned>(kFallOff[dx * dx + dy * dy]) * solidity / 15U);
-}
+std::uint8_t field_value(std::uint8_t solidity, int dx, int dy) { return kFieldValues.of[dx * dx + dy * dy][solidity]; }
 
 void LiveGrid::reset(const Pose2& centre) {
   const std::int32_t half = grid_.side() / 2;
@@ -62,12 +74,57 @@ void LiveGrid::recompute(const CellRect& rect) {
   const CellRect inside = intersection(rect, grid_.window());
   for (std::int32_t row = inside.row_min; row < inside.row_end; ++row) {
     for (std::int32_t column = inside.column_min; column < inside.column_end; ++column) {
-      field_[grid_.index(column, row)] = recomputed(column, row);
+      field_[grid_.index(column, row)] = 0;
+    }
+  }
+  if (inside.empty()) {
+    return;
+  }
+  const CellRect sources = intersection(
+      {inside.column_min - kReach, inside.row_min - kReach, inside.column_end + kReach, inside.row_end + kReach},
+      grid_.window());
+  for (std::int32_t row = sources.row_min; row < sources.row_end; ++row) {
+    for (std::int32_t column = sources.column_min; column < sources.column_end; ++column) {
+      if (grid_.at(column, row).hits != 0) {
+        spread(column, row, inside);
+      }
     }
   }
 }
 
+/// Raises the field round a cell, within `rect`, to what the cell's solidity makes of it.
+void LiveGrid::spread(std::int32_t column, std::int32_t row, const CellRect& rect) {
+  const std::uint8_t solid = solidity(grid_.at(column, row));
+  for (int dy = -kReach; dy <= kReach; ++dy) {
+    for (int dx = -kReach; dx <= kReach; ++dx) {
+      if (rect.contains(column + dx, row + dy)) {
+        std::uint8_t& value = field_[grid_.index(column + dx, row + dy)];
+        const std::uint8_t now = field_value(solid, dx, dy);
+        value = now > value ? now : value;
+      }
+    }
+  }
+}
+
+/// recomputed() where the neighbourhood lies in memory without a break.
+std::uint8_t LiveGrid::recomputed_unbroken(std::size_t index) const {
+  std::uint8_t best = 0;
+  for (int dy = -kReach; dy <= kReach; ++dy) {
+    const CellCount* const cells = grid_.cells().data() + static_cast<std::ptrdiff_t>(index) + dy * grid_.side();
+    for (int dx = -kReach; dx <= kReach; ++dx) {
+      if (cells[dx].hits != 0) {
+        const std::uint8_t value = field_value(solidity(cells[dx]), dx, dy);
+        best = value > best ? value : best;
+      }
+    }
+  }
+  return best;
+}
+
 std::uint8_t LiveGrid::recomputed(std::int32_t column, std::int32_t row) const {
+  if (grid_.unbroken(column, row, kReach)) {
+    return recomputed_unbroken(grid_.index(column, row));
+  }
   const CellRect window = grid_.window();
   std::uint8_t best = 0;
   for (int dy = -kReach; dy <= kReach; ++dy) {

@@ -4,7 +4,7 @@ namespace mellin {
 namespace {
 
 constexpr std::int32_t kSearchStep = 2;  // cells: within the reach of the field
-constexpr float kInlierField = 0.1F;  // the field beside something that was hit a few times
+constexpr float kInlierField = 0.1F;     // the field beside something that was hit a few times
 
 /// The field between the centres of four cells, 0 to 1, and its slope per cell.
 struct Sample {
@@ -20,10 +20,23 @@ Sample sample(const LiveGrid& grid, std::int32_t column, std::int32_t row, float
   const std::int32_t r = floor_cell(v);
   const float fx = u - static_cast<float>(c);
   const float fy = v - static_cast<float>(r);
-  const float f00 = grid.field(column + c, row + r);
-  const float f10 = grid.field(column + c + 1, row + r);
-  const float f01 = grid.field(column + c, row + r + 1);
-  const float f11 = grid.field(column + c + 1, row + r + 1);
+  float f00 = 0.0F;
+  float f10 = 0.0F;
+  float f01 = 0.0F;
+  float f11 = 0.0F;
+  if (grid.grid().unbroken(column + c, row + r, 1)) {
+    const std::uint8_t* const low = grid.field_data() + grid.grid().index(column + c, row + r);
+    const std::uint8_t* const high = low + grid.grid().side();
+    f00 = low[0];
+    f10 = low[1];
+    f01 = high[0];
+    f11 = high[1];
+  } else {
+    f00 = grid.field(column + c, row + r);
+    f10 = grid.field(column + c + 1, row + r);
+    f01 = grid.field(column + c, row + r + 1);
+    f11 = grid.field(column + c + 1, row + r + 1);
+  }
   constexpr float kScale = 1.0F / 255.0F;
   const float low = f00 + fx * (f10 - f00);
   const float high = f01 + fx * (f11 - f01);
@@ -242,6 +255,34 @@ Sym3 ScanMatcher::scan_information(const LiveGrid& grid, const Pose2& pose) cons
   return scale({d(xx), d(xy), d(xt), d(yy), d(yt), d(tt)}, worth);
 }
 
+/// How the search points of one heading are reached.
+struct ScanMatcher::SearchPoints {
+  std::size_t direct =
+      0;  ///< by memory_.indices: cells that stay in the window and away from its seam, all search long
+  std::size_t checked = 0;  ///< by memory_.offsets: the others
+};
+
+ScanMatcher::SearchPoints ScanMatcher::place_points(const LiveGrid& grid, const GridPose& at, float theta,
+                                                    std::size_t stride, std::int32_t reach_cells) const {
+  const SinCosF r = sincos(theta);
+  const float c = at.cos * r.cos - at.sin * r.sin;
+  const float s = at.sin * r.cos + at.cos * r.sin;
+  SearchPoints placed;
+  for (std::size_t i = 0; i < count_; i += stride) {
+    const Point2f q = memory_.points[i];
+    const CellOffset offset{static_cast<std::int16_t>(floor_cell(at.x_cells + c * q.x - s * q.y)),
+                            static_cast<std::int16_t>(floor_cell(at.y_cells + s * q.x + c * q.y))};
+    const std::int32_t column = at.column + offset.column;
+    const std::int32_t row = at.row + offset.row;
+    if (grid.grid().unbroken(column, row, reach_cells)) {
+      memory_.indices[placed.direct++] = static_cast<std::uint32_t>(grid.grid().index(column, row));
+    } else {
+      memory_.offsets[placed.checked++] = offset;
+    }
+  }
+  return placed;
+}
+
 Pose2 ScanMatcher::correlate(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const {
   const float cell = grid.cell_m();
   const GridPose at = grid_pose(prior, cell);
@@ -253,18 +294,12 @@ Pose2 ScanMatcher::correlate(const LiveGrid& grid, const Pose2& prior, const Sym
   const auto per_point = static_cast<double>(config_.scan_weight) / static_cast<double>(used * 255);
   const Sym3 stiffness = rotate(prior_information, prior.theta);
   const auto step_m = static_cast<double>(kSearchStep) * static_cast<double>(cell);
+  const std::uint8_t* const field = grid.field_data();
   double best = -1e300;
   Pose2 best_pose = prior;
   for (std::int32_t turn = -turns; turn <= turns; ++turn) {
     const auto theta = static_cast<float>(turn) * config_.search_angle_step_rad;
-    const SinCosF r = sincos(theta);
-    const float c = at.cos * r.cos - at.sin * r.sin;
-    const float s = at.sin * r.cos + at.cos * r.sin;
-    for (std::size_t i = 0; i < used; ++i) {
-      const Point2f q = memory_.points[i * stride];
-      memory_.offsets[i] = {static_cast<std::int16_t>(floor_cell(at.x_cells + c * q.x - s * q.y)),
-                            static_cast<std::int16_t>(floor_cell(at.y_cells + s * q.x + c * q.y))};
-    }
+    const SearchPoints placed = place_points(grid, at, theta, stride, kSearchStep * reach);
     for (std::int32_t dy = -reach; dy <= reach; ++dy) {
       for (std::int32_t dx = -reach; dx <= reach; ++dx) {
         // The prior's share first: it bounds what this pose can reach.
@@ -275,7 +310,11 @@ Pose2 ScanMatcher::correlate(const LiveGrid& grid, const Pose2& prior, const Sym
         const std::int32_t column = at.column + kSearchStep * dx;
         const std::int32_t row = at.row + kSearchStep * dy;
         std::uint32_t sum = 0;
-        for (std::size_t i = 0; i < used; ++i) {
+        const std::ptrdiff_t shift = kSearchStep * (static_cast<std::ptrdiff_t>(dy) * grid.grid().side() + dx);
+        for (std::size_t i = 0; i < placed.direct; ++i) {
+          sum += field[static_cast<std::ptrdiff_t>(memory_.indices[i]) + shift];
+        }
+        for (std::size_t i = 0; i < placed.checked; ++i) {
           sum += grid.field(column + memory_.offsets[i].column, row + memory_.offsets[i].row);
         }
         const double score = per_point * static_cast<double>(sum) - penalty;

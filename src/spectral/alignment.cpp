@@ -3,22 +3,21 @@
 #include <algorithm>
 #include <cmath>
 
+#include "spectral/obstacles.hpp"
+
 namespace mellin {
 namespace {
 
-constexpr std::uint8_t kBeyond = 255;      // field value: no obstacle within capture_m
-constexpr float kUnitsAtCapture = 254.0F;  // field value at capture_m
-constexpr float kStageShrink = 0.9F;       // each iteration narrows the reach by this, down to final_m
-constexpr float kSecondWayReach = 2.0F;    // reach at the start of the second way, in final_m
-constexpr double kDamping = 1e-3;          // least share of the mean stiffness added to each axis
-constexpr double kDampingStep = 8.0;       // it grows by this where a step makes things worse, and shrinks again
-constexpr double kConvergedXy = 1e-3;      // m
-constexpr double kConvergedTheta = 2e-4;   // rad
+constexpr float kStageShrink = 0.9F;      // each iteration narrows the reach by this, down to final_m
+constexpr float kSecondWayReach = 2.0F;   // reach at the start of the second way, in final_m
+constexpr double kDamping = 1e-3;         // least share of the mean stiffness added to each axis
+constexpr double kDampingStep = 8.0;      // it grows by this where a step makes things worse, and shrinks again
+constexpr double kConvergedXy = 1e-3;     // m
+constexpr double kConvergedTheta = 2e-4;  // rad
 constexpr std::uint32_t kFewestInliers = 30;
 constexpr float kNormalWindow_m = 0.3F;  // half side of the window that a wall's direction is taken from
 constexpr float kMostCellsInWindow = 16.0F;
-constexpr float kStraightness = 0.1F;       // largest ratio of the scatter across to the scatter along a wall
-constexpr float kMostCellsOfReach = 64.0F;  // bounds the work an obstacle makes, however small the cells are
+constexpr float kStraightness = 0.1F;  // largest ratio of the scatter across to the scatter along a wall
 constexpr float kFewestInWindow = 4.0F;
 
 bool valid(const AlignmentConfig& c) {
@@ -32,32 +31,15 @@ bool valid(const AlignmentConfig& c) {
          c.final_m <= c.capture_m;
 }
 
+bool fits(const Alignment::SideMemory& memory, const AlignmentConfig& config) {
+  return memory.field.size() == static_cast<std::size_t>(config.max_side) * config.max_side &&
+         memory.points.size() == config.max_points;
+}
+
 bool valid(const GridView& grid, std::uint16_t max_side) {
   return grid.side >= 2 && grid.side % 2 == 0 && grid.side <= max_side &&
          grid.cells.size() == static_cast<std::size_t>(grid.side) * grid.side && grid.cell_m > 0.0F &&
          std::isfinite(grid.cell_m);
-}
-
-bool occupied(const GridView& grid, int column, int row, std::uint8_t from) {
-  const std::uint8_t cell = grid.at(static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row));
-  return cell != kUnobserved && cell >= from;
-}
-
-/// Centre of mass of the hits in the 3 x 3 cells round an obstacle, in cells from the grid's corner.
-Point2f centre_of_hits(const GridView& grid, int column, int row) {
-  float weight = 0.0F;
-  float x = 0.0F;
-  float y = 0.0F;
-  for (int r = std::max(0, row - 1); r <= std::min(grid.side - 1, row + 1); ++r) {
-    for (int c = std::max(0, column - 1); c <= std::min(grid.side - 1, column + 1); ++c) {
-      const std::uint8_t cell = grid.at(static_cast<std::uint16_t>(c), static_cast<std::uint16_t>(r));
-      const float w = cell == kUnobserved ? 0.0F : static_cast<float>(cell);
-      weight += w;
-      x += w * static_cast<float>(c - column);
-      y += w * static_cast<float>(r - row);
-    }
-  }
-  return {static_cast<float>(column) + 0.5F + x / weight, static_cast<float>(row) + 0.5F + y / weight};
 }
 
 /// Unit normal of the wall through (column, row): the minor axis of the obstacles in the window round it; (0, 0) where
@@ -70,8 +52,9 @@ Point2f wall_normal(const GridView& grid, int column, int row, int reach, std::u
   float sxy = 0.0F;
   float syy = 0.0F;
   for (int r = std::max(0, row - reach); r <= std::min(grid.side - 1, row + reach); ++r) {
+    const std::uint8_t* const cells = grid.cells.data() + static_cast<std::ptrdiff_t>(r) * grid.side;
     for (int c = std::max(0, column - reach); c <= std::min(grid.side - 1, column + reach); ++c) {
-      if (occupied(grid, c, r, from)) {
+      if (is_obstacle(cells[c], from)) {
         const auto dx = static_cast<float>(c - column);
         const auto dy = static_cast<float>(r - row);
         n += 1.0F;
@@ -91,7 +74,7 @@ Point2f wall_normal(const GridView& grid, int column, int row, int reach, std::u
   const float yy = syy - sy * sy / n;
   const float half_trace = 0.5F * (xx + yy);
   const float half_difference = 0.5F * (xx - yy);
-  const float spread = sqrt(half_difference * half_difference + xy * xy);
+  const float spread = std::sqrt(half_difference * half_difference + xy * xy);
   if (half_trace - spread > kStraightness * (half_trace + spread)) {
     return {};
   }
@@ -99,7 +82,7 @@ Point2f wall_normal(const GridView& grid, int column, int row, int reach, std::u
   // the longer of the two is the better conditioned.
   Point2f normal =
       half_difference >= 0.0F ? Point2f{-xy, spread + half_difference} : Point2f{spread - half_difference, -xy};
-  const float length = sqrt(normal.x * normal.x + normal.y * normal.y);
+  const float length = std::sqrt(normal.x * normal.x + normal.y * normal.y);
   if (!(length > 0.0F)) {
     return {};
   }
@@ -161,49 +144,101 @@ Status Alignment::init(const AlignmentConfig& config, const Memory& memory) {
   if (!valid(config)) {
     return Status::invalid_config;
   }
-  if (memory.field.size() != static_cast<std::size_t>(config.max_side) * config.max_side ||
-      memory.points.size() != config.max_points) {
+  if (!fits(memory.a, config) || !fits(memory.b, config) || memory.field.below.size() != config.max_side ||
+      memory.field.runs.size() != config.max_side) {
     return Status::insufficient_memory;
   }
   config_ = config;
-  memory_ = memory;
+  a_ = {};
+  b_ = {};
+  a_.memory = memory.a;
+  b_.memory = memory.b;
+  field_memory_ = memory.field;
   stage_ = Stage::idle;
   return Status::ok;
 }
 
+Status Alignment::set_side(Side& side, const GridView& grid) {
+  side.has_field = false;
+  side.has_points = false;
+  side.grid = {};
+  stage_ = Stage::idle;
+  if (side.memory.field.empty() || !valid(grid, config_.max_side)) {
+    return Status::invalid_argument;
+  }
+  side.grid = grid;
+  return Status::ok;
+}
+
 Status Alignment::begin(const GridView& a, const GridView& b, const Pose2& a_T_b) {
-  if (memory_.field.empty() || !valid(a, config_.max_side) || !valid(b, config_.max_side) || !is_finite(a_T_b)) {
+  const Status first = set_a(a);
+  const Status second = set_b(b);
+  return first != Status::ok ? first : (second != Status::ok ? second : begin(a_T_b));
+}
+
+Status Alignment::begin(const Pose2& a_T_b) {
+  if (a_.grid.side == 0 || b_.grid.side == 0 || !is_finite(a_T_b)) {
     return Status::invalid_argument;
   }
   result_ = {};
   result_.converged = true;
   evidence_ = {};
   backward_ = false;
-  start_way(a, b, a_T_b, config_.capture_m);
+  start_way(a_, b_, a_T_b, config_.capture_m);
   return Status::ok;
 }
 
-void Alignment::start_way(GridView onto, GridView from, const Pose2& onto_T_from, float reach_m) {
-  onto_ = onto;
-  from_ = from;
+void Alignment::start_way(Side& onto, Side& from, const Pose2& onto_T_from, float reach_m) {
+  onto_ = &onto;
+  from_ = &from;
   onto_T_from_ = onto_T_from;
   trial_ = onto_T_from;
   reach_m_ = reach_m;
   iterations_ = 0;
   damping_ = kDamping;
   settled_ = false;
-  row_ = 0;
-  obstacles_ = 0;
-  seen_ = 0;
-  point_count_ = 0;
-  std::fill(memory_.field.begin(), memory_.field.end(), kBeyond);
+  next_stage();
+}
+
+/// What this way lacks first: the field, the points, or nothing any more.
+void Alignment::next_stage() {
+  if (!onto_->has_field) {
+    begin_field();
+  } else if (!from_->has_points) {
+    begin_points();
+  } else {
+    stage_ = Stage::iterate;
+  }
+}
+
+void Alignment::begin_field() {
+  const GridView& grid = onto_->grid;
+  if (!config_.keep_both) {
+    from_->has_field = false;  // it gives way
+  }
+  field_.begin(grid, config_.capture_m, config_.occupied_from,
+               onto_->memory.field.first(static_cast<std::size_t>(grid.side) * grid.side), field_memory_);
   stage_ = Stage::field;
+}
+
+void Alignment::begin_points() {
+  if (!config_.keep_both) {
+    onto_->has_points = false;  // they give way
+  }
+  from_->obstacles = 0;
+  from_->point_count = 0;
+  seen_ = 0;
+  row_ = 0;
+  stage_ = Stage::count;
 }
 
 bool Alignment::step() {
   switch (stage_) {
     case Stage::field:
-      build_field();
+      if (field_.step(config_.rows_per_step)) {
+        onto_->has_field = true;
+        next_stage();
+      }
       break;
     case Stage::count:
       count_obstacles();
@@ -221,117 +256,88 @@ bool Alignment::step() {
   return stage_ != Stage::idle && stage_ != Stage::done;
 }
 
-/// Moves row_ on by a slice of `grid`; at the end starts `next` at row 0.
-void Alignment::advance(const GridView& grid, int end, Stage next) {
-  row_ = end;
-  if (row_ == grid.side) {
-    row_ = 0;
-    stage_ = next;
-  }
-}
-
-int Alignment::slice_end(const GridView& grid) const { return std::min<int>(grid.side, row_ + config_.rows_per_step); }
-
-void Alignment::build_field() {
-  const int end = slice_end(onto_);
-  for (int row = row_; row < end; ++row) {
-    for (int column = 0; column < onto_.side; ++column) {
-      if (occupied(onto_, column, row, config_.occupied_from)) {
-        stamp_distance(centre_of_hits(onto_, column, row));
-      }
-    }
-  }
-  advance(onto_, end, Stage::count);
-}
-
-/// Lowers the field to the distance from an obstacle (cells from the corner) wherever that is nearer.
-void Alignment::stamp_distance(const Point2f& obstacle) {
-  const float reach = std::min(config_.capture_m / onto_.cell_m, kMostCellsOfReach);
-  const float units = kUnitsAtCapture * (onto_.cell_m / config_.capture_m);
-  const auto limit = static_cast<float>(onto_.side - 1);
-  const int first_column = static_cast<int>(std::max(0.0F, obstacle.x - reach));
-  const int last_column = static_cast<int>(std::min(limit, obstacle.x + reach));
-  const int first_row = static_cast<int>(std::max(0.0F, obstacle.y - reach));
-  const int last_row = static_cast<int>(std::min(limit, obstacle.y + reach));
-  for (int row = first_row; row <= last_row; ++row) {
-    const float dy = (static_cast<float>(row) + 0.5F - obstacle.y) * units;
-    std::uint8_t* const cells = memory_.field.data() + static_cast<std::size_t>(row) * onto_.side;
-    for (int column = first_column; column <= last_column; ++column) {
-      const float dx = (static_cast<float>(column) + 0.5F - obstacle.x) * units;
-      const float squared = dx * dx + dy * dy;
-      const float rounded_up = static_cast<float>(cells[column]) - 0.5F;
-      if (squared < rounded_up * rounded_up) {
-        cells[column] = static_cast<std::uint8_t>(std::floor(sqrt(squared) + 0.5F));
-      }
-    }
-  }
-}
+int Alignment::slice_end() const { return std::min<int>(from_->grid.side, row_ + config_.rows_per_step); }
 
 void Alignment::count_obstacles() {
-  const int end = slice_end(from_);
-  for (int row = row_; row < end; ++row) {
-    for (int column = 0; column < from_.side; ++column) {
-      obstacles_ += occupied(from_, column, row, config_.occupied_from) ? 1U : 0U;
-    }
+  const std::size_t side = from_->grid.side;
+  const int end = slice_end();
+  const std::uint8_t* const cells = from_->grid.cells.data();
+  std::uint32_t obstacles = 0;
+  for (std::size_t i = static_cast<std::size_t>(row_) * side; i < static_cast<std::size_t>(end) * side; ++i) {
+    obstacles += is_obstacle(cells[i], config_.occupied_from) ? 1U : 0U;
   }
-  advance(from_, end, Stage::points);
+  from_->obstacles += obstacles;
+  row_ = end;
+  if (row_ == from_->grid.side) {
+    row_ = 0;
+    stage_ = Stage::points;
+  }
 }
 
 void Alignment::collect_points() {
-  const int end = slice_end(from_);
-  const std::uint32_t wanted = std::min<std::uint32_t>(obstacles_, config_.max_points);
-  const int reach = static_cast<int>(std::clamp(kNormalWindow_m / from_.cell_m, 1.0F, kMostCellsInWindow));
-  const float half = 0.5F * static_cast<float>(from_.side);
+  const GridView& grid = from_->grid;
+  const int end = slice_end();
+  const std::uint32_t wanted = std::min<std::uint32_t>(from_->obstacles, config_.max_points);
+  const int reach = static_cast<int>(std::clamp(kNormalWindow_m / grid.cell_m, 1.0F, kMostCellsInWindow));
+  const float half = 0.5F * static_cast<float>(grid.side);
   for (int row = row_; row < end; ++row) {
-    for (int column = 0; column < from_.side; ++column) {
-      if (!occupied(from_, column, row, config_.occupied_from)) {
+    const std::uint8_t* const cells = grid.cells.data() + static_cast<std::ptrdiff_t>(row) * grid.side;
+    for (int column = 0; column < grid.side; ++column) {
+      if (!is_obstacle(cells[column], config_.occupied_from)) {
         continue;
       }
       // Obstacle k is taken where k * wanted / obstacles steps up: evenly, and exactly `wanted` of them.
-      const std::uint64_t due = (static_cast<std::uint64_t>(seen_) + 1) * wanted / obstacles_;
+      const std::uint64_t due = (static_cast<std::uint64_t>(seen_) + 1) * wanted / from_->obstacles;
       ++seen_;
-      if (due == point_count_) {
+      if (due == from_->point_count) {
         continue;
       }
-      const Point2f at = centre_of_hits(from_, column, row);
-      const Point2f normal = wall_normal(from_, column, row, reach, config_.occupied_from);
-      memory_.points[point_count_++] = {(at.x - half) * from_.cell_m, (at.y - half) * from_.cell_m, normal.x, normal.y};
+      const Point2f at = centre_of_hits(grid, column, row);
+      const Point2f normal = wall_normal(grid, column, row, reach, config_.occupied_from);
+      from_->memory.points[from_->point_count++] = {(at.x - half) * grid.cell_m, (at.y - half) * grid.cell_m, normal.x,
+                                                    normal.y};
     }
   }
-  advance(from_, end, Stage::iterate);
+  row_ = end;
+  if (row_ == grid.side) {
+    from_->has_points = true;
+    next_stage();
+  }
 }
 
 /// Distance field and its gradient at a point of a, bilinear between the centres of four cells.
 Alignment::Sample Alignment::sample(float x_m, float y_m) const {
-  const float half = 0.5F * static_cast<float>(onto_.side) - 0.5F;
-  const float x = x_m / onto_.cell_m + half;
-  const float y = y_m / onto_.cell_m + half;
-  const auto limit = static_cast<float>(onto_.side - 1);
+  const GridView& onto = onto_->grid;
+  const std::uint8_t* const field = onto_->memory.field.data();
+  const float half = 0.5F * static_cast<float>(onto.side) - 0.5F;
+  const float x = x_m / onto.cell_m + half;
+  const float y = y_m / onto.cell_m + half;
+  const auto limit = static_cast<float>(onto.side - 1);
   if (!(x >= 0.0F && y >= 0.0F && x < limit && y < limit)) {
     return {};
   }
   const auto column = static_cast<std::size_t>(x);
   const auto row = static_cast<std::size_t>(y);
-  const std::size_t at = row * onto_.side + column;
-  const std::uint8_t v00 = memory_.field[at];
-  const std::uint8_t v10 = memory_.field[at + 1];
-  const std::uint8_t v01 = memory_.field[at + onto_.side];
-  const std::uint8_t v11 = memory_.field[at + onto_.side + 1];
+  const std::size_t at = row * onto.side + column;
+  const std::uint8_t v00 = field[at];
+  const std::uint8_t v10 = field[at + 1];
+  const std::uint8_t v01 = field[at + onto.side];
+  const std::uint8_t v11 = field[at + onto.side + 1];
   Sample sample;
-  sample.observed = onto_.cells[at] != kUnobserved;
-  if (v00 == kBeyond || v10 == kBeyond || v01 == kBeyond || v11 == kBeyond) {
+  sample.observed = onto.cells[at] != kUnobserved;
+  if (v00 == kFieldBeyond || v10 == kFieldBeyond || v01 == kFieldBeyond || v11 == kFieldBeyond) {
     return sample;
   }
   const float fx = x - static_cast<float>(column);
   const float fy = y - static_cast<float>(row);
   const float low = static_cast<float>(v00) + fx * static_cast<float>(v10 - v00);
   const float high = static_cast<float>(v01) + fx * static_cast<float>(v11 - v01);
-  const float metres = config_.capture_m / kUnitsAtCapture;
+  const float metres = config_.capture_m / kFieldUnitsAtReach;
   sample.near = true;
   sample.distance_m = (low + fy * (high - low)) * metres;
   sample.gradient_x =
-      (static_cast<float>(v10 - v00) * (1.0F - fy) + static_cast<float>(v11 - v01) * fy) * metres / onto_.cell_m;
-  sample.gradient_y = (high - low) * metres / onto_.cell_m;
+      (static_cast<float>(v10 - v00) * (1.0F - fy) + static_cast<float>(v11 - v01) * fy) * metres / onto.cell_m;
+  sample.gradient_y = (high - low) * metres / onto.cell_m;
   return sample;
 }
 
@@ -344,8 +350,8 @@ Alignment::System Alignment::linearise(const Pose2& onto_T_from) const {
   const auto ty = static_cast<float>(onto_T_from.y);
   const float reach2 = reach_m_ * reach_m_;
   System system;
-  for (std::size_t i = 0; i < point_count_; ++i) {
-    const AlignmentPoint& p = memory_.points[i];
+  for (std::size_t i = 0; i < from_->point_count; ++i) {
+    const AlignmentPoint& p = from_->memory.points[i];
     const Sample at = sample(c * p.x - s * p.y + tx, s * p.x + c * p.y + ty);
     const float d2 = at.distance_m * at.distance_m;
     if (!at.near || d2 >= reach2) {
@@ -400,13 +406,13 @@ void Alignment::iterate() {
 void Alignment::finish_way(bool converged) {
   result_.converged = result_.converged && converged;
   result_.iterations = static_cast<std::uint16_t>(result_.iterations + iterations_);
-  result_.points = static_cast<std::uint16_t>(result_.points + point_count_);
+  result_.points = static_cast<std::uint16_t>(result_.points + from_->point_count);
   add_evidence();
   if (!backward_) {
     result_.a_T_b = onto_T_from_;
     if (config_.both_ways) {
       backward_ = true;
-      start_way(from_, onto_, inverse(onto_T_from_), std::min(config_.capture_m, kSecondWayReach * config_.final_m));
+      start_way(*from_, *onto_, inverse(onto_T_from_), std::min(config_.capture_m, kSecondWayReach * config_.final_m));
       return;
     }
   } else {
@@ -428,13 +434,13 @@ void Alignment::add_evidence() {
   const auto ty = static_cast<float>(onto_T_from_.y);
   // All points within correlation_m of wall are one witness, and both ways see the same walls.
   const double cells_a_point =
-      point_count_ > 0 ? static_cast<double>(obstacles_) / static_cast<double>(point_count_) : 1.0;
-  const double metres_a_point = cells_a_point * static_cast<double>(from_.cell_m);
+      from_->point_count > 0 ? static_cast<double>(from_->obstacles) / static_cast<double>(from_->point_count) : 1.0;
+  const double metres_a_point = cells_a_point * static_cast<double>(from_->grid.cell_m);
   const double sigma = static_cast<double>(config_.point_sigma_m);
   const double weight = std::min(1.0, metres_a_point / static_cast<double>(config_.correlation_m)) / (sigma * sigma) *
                         (config_.both_ways ? 0.5 : 1.0);
-  for (std::size_t i = 0; i < point_count_; ++i) {
-    AlignmentPoint p = memory_.points[i];
+  for (std::size_t i = 0; i < from_->point_count; ++i) {
+    AlignmentPoint p = from_->memory.points[i];
     const AlignmentPoint there{c * p.x - s * p.y + tx, s * p.x + c * p.y + ty, c * p.normal_x - s * p.normal_y,
                                s * p.normal_x + c * p.normal_y};
     const Sample at = sample(there.x, there.y);

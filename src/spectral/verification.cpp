@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "spectral/obstacles.hpp"
+
 namespace mellin {
 namespace {
 
@@ -24,17 +26,17 @@ bool valid(const Span<const std::uint8_t>& cells, std::uint16_t side, float cell
 std::uint8_t class_of_block(const GridView& grid, std::uint16_t column, std::uint16_t row, std::uint16_t block,
                             std::uint8_t occupied_from) {
   std::uint32_t observed = 0;
-  bool occupied = false;
-  for (std::uint16_t y = 0; y < block; ++y) {
-    const std::size_t start = (static_cast<std::size_t>(row) * block + y) * grid.side + column * std::size_t{block};
+  std::uint32_t obstacles = 0;
+  const std::uint8_t* cells =
+      grid.cells.data() + static_cast<std::size_t>(row) * block * grid.side + column * std::size_t{block};
+  for (std::uint16_t y = 0; y < block; ++y, cells += grid.side) {
     for (std::uint16_t x = 0; x < block; ++x) {
-      const std::uint8_t cell = grid.cells[start + x];
-      observed += cell != kUnobserved ? 1U : 0U;
-      occupied = occupied || (cell != kUnobserved && cell >= occupied_from);
+      observed += cells[x] != kUnobserved ? 1U : 0U;
+      obstacles += is_obstacle(cells[x], occupied_from) ? 1U : 0U;
     }
   }
   std::uint8_t bits = observed > 0 ? kClassObserved : 0;
-  if (occupied) {
+  if (obstacles > 0) {
     bits |= kClassOccupied;
   } else if (observed > 0 && 2 * observed >= static_cast<std::uint32_t>(block) * block) {
     bits |= kMarkFree;

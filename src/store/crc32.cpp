@@ -7,12 +7,12 @@ namespace {
 
 constexpr std::uint32_t kPolynomial = 0xEDB88320U;
 
-/// Remainders of the sixteen half-bytes.
-constexpr std::array<std::uint32_t, 16> remainders() {
-  std::array<std::uint32_t, 16> table{};
-  for (std::uint32_t i = 0; i < 16; ++i) {
+/// Remainders of all bytes.
+constexpr std::array<std::uint32_t, 256> remainders() {
+  std::array<std::uint32_t, 256> table{};
+  for (std::uint32_t i = 0; i < 256; ++i) {
     std::uint32_t r = i;
-    for (int bit = 0; bit < 4; ++bit) {
+    for (int bit = 0; bit < 8; ++bit) {
       r = (r >> 1U) ^ ((r & 1U) != 0 ? kPolynomial : 0U);
     }
     table[i] = r;
@@ -20,16 +20,14 @@ constexpr std::array<std::uint32_t, 16> remainders() {
   return table;
 }
 
-constexpr std::array<std::uint32_t, 16> kRemainders = remainders();
+constexpr std::array<std::uint32_t, 256> kRemainders = remainders();
 
 }  // namespace
 
 std::uint32_t crc32(Span<const std::uint8_t> bytes, std::uint32_t crc) {
   crc = ~crc;
   for (const std::uint8_t byte : bytes) {
-    crc ^= byte;
-    crc = (crc >> 4U) ^ kRemainders[crc & 15U];
-    crc = (crc >> 4U) ^ kRemainders[crc & 15U];
+    crc = (crc >> 8U) ^ kRemainders[(crc ^ byte) & 255U];
   }
   return ~crc;
 }

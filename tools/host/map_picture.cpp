@@ -38,8 +38,8 @@ class GridSampler {
   std::uint8_t at(double x, double y) const {
     const double cell_m = static_cast<double>(grid_.cell_m);
     const double half = grid_.side / 2.0;
-    const double column = std::floor((rotation_.cos * x - rotation_.sin * y + submap_T_map_.x) / cell_m + half);
-    const double row = std::floor((rotation_.sin * x + rotation_.cos * y + submap_T_map_.y) / cell_m + half);
+    const double column = (rotation_.cos * x - rotation_.sin * y + submap_T_map_.x) / cell_m + half;
+    const double row = (rotation_.sin * x + rotation_.cos * y + submap_T_map_.y) / cell_m + half;
     const bool inside = column >= 0.0 && row >= 0.0 && column < grid_.side && row < grid_.side;
     return inside ? grid_.at(static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(row)) : kUnobserved;
   }
@@ -138,14 +138,15 @@ void MapPicture::add(const GridView& grid, const Pose2& map_T_submap) {
     for (std::size_t column = box.column; column < box.column_end; ++column) {
       float sum = 0.0F;
       int count = 0;
-      for (int i = 0; i < samples * samples; ++i) {
-        const int down = i / samples;
-        const double x = (static_cast<double>(column) + (i % samples + 0.5) / samples) * options_.cell_m + origin_x_;
-        const double y = (static_cast<double>(row) + (down + 0.5) / samples) * options_.cell_m + origin_y_;
-        const float evidence = cell_evidence_[sampler.at(x, y)];
-        if (!std::isnan(evidence)) {
-          sum += evidence;
-          ++count;
+      for (int i = 0; i < samples; ++i) {
+        const double y = (static_cast<double>(row) + (i + 0.5) / samples) * options_.cell_m + origin_y_;
+        for (int k = 0; k < samples; ++k) {
+          const double x = (static_cast<double>(column) + (k + 0.5) / samples) * options_.cell_m + origin_x_;
+          const float evidence = cell_evidence_[sampler.at(x, y)];
+          if (!std::isnan(evidence)) {
+            sum += evidence;
+            ++count;
+          }
         }
       }
       if (count > 0) {

@@ -59,7 +59,10 @@ void visit_settings(C& c, Visit&& visit) {
   visit("registration.peak_share", c.registration.matcher.peak_share);
   visit("registration.max_peaks", c.registration.matcher.max_peaks);
   visit("registration.aligned", c.registration.aligned);
+  visit("registration.aligned_share", c.registration.aligned_share);
+  visit("registration.aligned_from", c.registration.aligned_from);
   visit("registration.alignment.max_points", c.registration.alignment.max_points);
+  visit("registration.alignment.keep_both", c.registration.alignment.keep_both);
   visit("collection.close_loops", c.collection.close_loops);
   visit("collection.candidates", c.collection.candidates);
   visit("collection.candidate_agreement", c.collection.candidate_agreement);

@@ -47,11 +47,15 @@ class DigestMatcher {
   ~DigestMatcher() = default;
 };
 
-/// Registers two full grids. One job at a time, in bounded slices.
+/// Registers full grids: one, the query, with several others in turn, so that what is made of the query alone is made
+/// once. One job at a time, in bounded slices.
 class GridMatcher {
  public:
-  /// Starts; both grids must stay until step() says true. invalid_argument: sizes out of range.
-  virtual Status begin(const GridView& a, const GridView& b) = 0;
+  /// Names the query. It must stay until the last step() against it. invalid_argument: size out of range.
+  virtual Status set_query(const GridView& b) = 0;
+  /// Starts to register the query (b) with `a`, which must stay until step() says true. invalid_argument: size out of
+  /// range, no query.
+  virtual Status begin(const GridView& a) = 0;
   virtual bool step() = 0;
   virtual const PlaceHypotheses& hypotheses() const = 0;
 

@@ -19,7 +19,9 @@ struct RegistrationConfig {
   VerificationConfig verification;
   std::uint16_t class_side = 192;  ///< cells of the grids that are compared; divides grid_side
   AlignmentConfig alignment;
-  std::uint8_t aligned = 2;  ///< hypotheses that are aligned, best agreement first: 1 to kMaxPlaceHypotheses
+  std::uint8_t aligned = 2;    ///< hypotheses that are aligned, best agreement first: 1 to kMaxPlaceHypotheses …
+  float aligned_share = 0.6F;  ///< … as long as they agree at least this share as well as the best one …
+  float aligned_from = 0.1F;   ///< … and at least so well
 };
 
 class SpectralRegistration final : public GridMatcher {
@@ -58,15 +60,29 @@ class SpectralRegistration final : public GridMatcher {
   }
 
   Status init(const RegistrationConfig& config, const Memory& memory, Span<float> scratch);
-  Status begin(const GridView& a, const GridView& b) override;
+  Status set_query(const GridView& b) override;
+  Status begin(const GridView& a) override;
   bool step() override;
   const PlaceHypotheses& hypotheses() const override { return hypotheses_; }
 
  private:
-  enum class Stage : std::uint8_t { idle, picture_a, extract_a, picture_b, extract_b, match, classify, verify, align };
+  enum class Stage : std::uint8_t {
+    idle,
+    picture_b,
+    extract_b,
+    classify_b,
+    picture_a,
+    extract_a,
+    match,
+    classify_a,
+    verify,
+    align,
+  };
 
   bool begin_picture(const GridView& grid, Stage stage);
   void begin_extract(Features& out, Stage stage);
+  void classify_query();
+  void classify_other();
   void verify_candidate();
   void begin_alignment();
   void finish_alignment();
@@ -80,6 +96,7 @@ class SpectralRegistration final : public GridMatcher {
   Stage stage_ = Stage::idle;
   GridView a_;
   GridView b_;
+  bool query_ready_ = false;  ///< features and classes of b_ are made
   ClassView class_a_;
   ClassView class_b_;
   std::size_t next_ = 0;

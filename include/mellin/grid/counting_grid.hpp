@@ -66,6 +66,20 @@ class CountingGrid {
            static_cast<std::size_t>(wrap(column - column_min_ + column_base_));
   }
 
+  /// Whether all cells up to `reach` columns and rows from (column, row) are in the window, and lie in memory without a
+  /// break: cell (column + dx, row + dy) at index(column, row) + dy * side() + dx.
+  bool unbroken(std::int32_t column, std::int32_t row, std::int32_t reach) const {
+    const std::int32_t c = column - column_min_;
+    const std::int32_t r = row - row_min_;
+    const std::int32_t last = side_ - 1 - reach;
+    if (c < reach || c > last || r < reach || r > last) {
+      return false;
+    }
+    const std::int32_t cc = wrap(c + column_base_);
+    const std::int32_t rr = wrap(r + row_base_);
+    return cc >= reach && cc <= last && rr >= reach && rr <= last;
+  }
+
   Span<CellCount> cells() { return cells_; }
   Span<const CellCount> cells() const { return cells_; }
 

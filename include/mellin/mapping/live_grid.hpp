@@ -47,6 +47,9 @@ class LiveGrid {
     return grid_.window().contains(column, row) ? field_[grid_.index(column, row)] : std::uint8_t{0};
   }
 
+  /// The whole field as it lies in memory: cell by cell at grid().index().
+  const std::uint8_t* field_data() const { return field_.data(); }
+
   /// Makes this grid equal to another one of the same size.
   void copy_from(const LiveGrid& other);
 
@@ -55,6 +58,8 @@ class LiveGrid {
   void count(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect);
   void solidity_changed(std::int32_t column, std::int32_t row, std::uint8_t before, std::uint8_t after);
   std::uint8_t recomputed(std::int32_t column, std::int32_t row) const;
+  std::uint8_t recomputed_unbroken(std::size_t index) const;
+  void spread(std::int32_t column, std::int32_t row, const CellRect& rect);
   void recompute(const CellRect& rect);
 
   CountingGrid grid_;

@@ -48,11 +48,13 @@ class ScanMatcher {
   struct Memory {
     Span<Point2f> points;
     Span<CellOffset> offsets;
+    Span<std::uint32_t> indices;  ///< where those cells lie in memory that can be reached without looking
   };
   template <class A>
   static constexpr Memory carve(A& arena, const ScanMatcherConfig& config) {
     return {arena.template take<Point2f>(config.max_points, Part::mapper, Region::fast),
-            arena.template take<CellOffset>(config.search_points, Part::mapper, Region::fast)};
+            arena.template take<CellOffset>(config.search_points, Part::mapper, Region::fast),
+            arena.template take<std::uint32_t>(config.search_points, Part::mapper, Region::fast)};
   }
 
   ScanMatcher() = default;
@@ -81,6 +83,9 @@ class ScanMatcher {
   struct Linearised;
   Linearised linearise(const LiveGrid& grid, const GridPose& at, float x, float y, float theta) const;
   std::size_t neighbour(std::size_t point, int direction, float cell_m) const;
+  struct SearchPoints;
+  SearchPoints place_points(const LiveGrid& grid, const GridPose& at, float theta, std::size_t stride,
+                            std::int32_t reach_cells) const;
   Pose2 correlate(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const;
 
   ScanMatcherConfig config_;
