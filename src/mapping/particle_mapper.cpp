@@ -21,6 +21,23 @@ Pose2 draw(const Sym3& covariance, Random& random) {
   return {a * u, b * u + d * v, c * u + e * v + sqrt(rest > 0.0 ? rest : 0.0) * w};
 }
 
+/// What an error of the odometry leaves in a pose that scan and odometry determine together: of the estimate
+/// S (A x_scan + W x_odometry) with S = (A + W)^-1, an odometry error of covariance W^-1 becomes one of S W S.
+Sym3 drift_left(const Sym3& odometry_information, const Sym3& scan_information) {
+  const Sym3& w = odometry_information;  // diagonal
+  Sym3 s;
+  if (!invert(scan_information + w, s)) {
+    (void)invert(w, s);
+    return s;
+  }
+  return {s.xx * w.xx * s.xx + s.xy * w.yy * s.xy + s.xt * w.tt * s.xt,
+          s.xx * w.xx * s.xy + s.xy * w.yy * s.yy + s.xt * w.tt * s.yt,
+          s.xx * w.xx * s.xt + s.xy * w.yy * s.yt + s.xt * w.tt * s.tt,
+          s.xy * w.xx * s.xy + s.yy * w.yy * s.yy + s.yt * w.tt * s.yt,
+          s.xy * w.xx * s.xt + s.yy * w.yy * s.yt + s.yt * w.tt * s.tt,
+          s.xt * w.xx * s.xt + s.yt * w.yy * s.yt + s.tt * w.tt * s.tt};
+}
+
 }  // namespace
 
 ParticleMapper::ParticleMapper(const ParticleMapperConfig& config, const Memory& memory, Span<const LaserConfig> lasers,
@@ -124,23 +141,18 @@ bool ParticleMapper::take(const Pose2& predicted, const Sym3& prior) {
     const Pose2 own = p == best_ ? predicted : compose(memory_.particles[p].pose, between(best_before, predicted));
     any_matched |= propose(p, own, prior);
   }
-  (void)scans_.take_staged();
-  for (std::size_t p = 0; p < config_.particles; ++p) {
-    remember(p, number);
-  }
   best_ = 0;
   for (std::size_t p = 1; p < config_.particles; ++p) {
     best_ = memory_.particles[p].log_weight > memory_.particles[best_].log_weight ? p : best_;
   }
   tracked_ = memory_.particles[best_].pose;
   tracked_information_ = memory_.particles[best_].information;
-  // Over the whole way since the last taken scan: where neither this match nor those on the way determined the pose,
-  // odometry did.
-  const Sym3 way = prior_information(motion_);
-  const double gain = wide(config_.scan_information_gain);
-  const Sym3 information = scale(tracked_information_ + scale(prior, -1.0), gain) + way;
-  if (!invert(information, memory_.covariances[number % pose_capacity()])) {
-    (void)invert(way, memory_.covariances[number % pose_capacity()]);
+  // Before the scan is in the map, which it would agree with by itself.
+  memory_.drifts[number % pose_capacity()] =
+      drift_left(prior_information(motion_), matcher_.scan_information(memory_.particles[best_].grid, tracked_));
+  (void)scans_.take_staged();
+  for (std::size_t p = 0; p < config_.particles; ++p) {
+    remember(p, number);
   }
   const bool matched = any_matched && (number == 0 || memory_.particles[best_].matched);
   if (config_.particles > 1) {

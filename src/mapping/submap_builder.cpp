@@ -21,7 +21,7 @@ bool SubmapBuilder::scan_taken(const LocalMapper& mapper) {
   ++new_scans_;
   path_m_ += step;
   new_path_m_ += step;
-  new_drift_ = new_drift_ + mapper.scan_covariance(newest);
+  new_drift_ = new_drift_ + mapper.scan_drift(newest);
   const bool uncertain = new_scans_ >= config_.min_scans && too_uncertain(scale(new_drift_, new_scans_));
   if (!any_frozen_) {
     return uncertain || taken_ >= config_.max_scans || path_m_ >= static_cast<double>(config_.max_path_m);
@@ -44,7 +44,7 @@ std::uint32_t SubmapBuilder::scans_in_reach(const LocalMapper& mapper) const {
   while (count < config_.max_scans && end - count > mapper.first_remembered()) {
     const std::uint32_t next = end - count;
     path += translation(between(mapper.scan_pose(next - 1), mapper.scan_pose(next)));
-    drift = drift + mapper.scan_covariance(next);
+    drift = drift + mapper.scan_drift(next);
     if (path > static_cast<double>(config_.max_path_m) ||
         (count >= config_.min_scans && too_uncertain(scale(drift, count)))) {
       break;
@@ -100,7 +100,7 @@ Sym3 SubmapBuilder::drift_since(const LocalMapper& mapper, const Pose2& session_
   std::uint32_t count = 0;
   for (std::uint32_t number = (from < oldest ? oldest : from) + 1; number <= to; ++number) {
     const Pose2 submap_T_robot = between(session_T_submap, mapper.scan_pose(number));
-    sum = sum + carried(mapper.scan_covariance(number), submap_T_robot);
+    sum = sum + carried(mapper.scan_drift(number), submap_T_robot);
     ++count;
   }
   const double share = static_cast<double>(config_.drift_share);

@@ -29,7 +29,6 @@ void visit_settings(C& c, Visit&& visit) {
   visit("mapper.take_angle_rad", c.mapper.take_angle_rad);
   visit("mapper.resample_share", c.mapper.resample_share);
   visit("mapper.proposal_spread", c.mapper.proposal_spread);
-  visit("mapper.scan_information_gain", c.mapper.scan_information_gain);
   visit("mapper.noise.distance_base_m", c.mapper.noise.distance_base_m);
   visit("mapper.noise.distance_per_m", c.mapper.noise.distance_per_m);
   visit("mapper.noise.distance_per_rad", c.mapper.noise.distance_per_rad);
@@ -42,6 +41,8 @@ void visit_settings(C& c, Visit&& visit) {
   visit("matcher.search_angle_step_rad", c.mapper.matcher.search_angle_step_rad);
   visit("matcher.max_iterations", c.mapper.matcher.max_iterations);
   visit("matcher.scan_weight", c.mapper.matcher.scan_weight);
+  visit("matcher.point_sigma_m", c.mapper.matcher.point_sigma_m);
+  visit("matcher.independent_share", c.mapper.matcher.independent_share);
   visit("matcher.min_inlier_share", c.mapper.matcher.min_inlier_share);
   visit("submaps.max_path_m", c.submaps.max_path_m);
   visit("submaps.every_scans", c.submaps.every_scans);

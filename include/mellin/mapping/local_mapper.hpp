@@ -57,9 +57,10 @@ class LocalMapper {
   virtual std::uint32_t first_remembered() const = 0;
   /// Where the robot was at a scan that scans() holds, as the best hypothesis has it now.
   virtual Pose2 scan_pose(std::uint32_t number) const = 0;
-  /// Covariance with which that scan was placed, given the ones before it, in the robot's own frame: as good as the
-  /// scan determines it, and where it does not (along a corridor), as good as odometry from the scan before.
-  virtual Sym3 scan_covariance(std::uint32_t number) const = 0;
+  /// Covariance, in the robot's own frame, of what the error of the odometry since the scan before leaves in that
+  /// scan's pose: next to nothing where the scan determines the pose, all of it where it does not (along a corridor).
+  /// Since odometry errs the same way again and again, such deviations add up along the way.
+  virtual Sym3 scan_drift(std::uint32_t number) const = 0;
   virtual const MapperStatistics& statistics() const = 0;
 
  protected:

@@ -33,10 +33,7 @@ struct ParticleMapperConfig {
   float take_angle_rad = 0.523598776F;  ///< … or so much turn since the last taken one
   float resample_share = 0.5F;          ///< resample when the effective number of particles falls below this share
   float proposal_spread = 0.3F;         ///< share of the match's standard deviation that sampling uses
-  /// What a match is worth for the covariance of a scan, against its weight in the search. The search weighs a beam as
-  /// if its end were known to 0.1 m or so, which lets a prior hold it where walls are smooth; it is known to 0.03 m.
-  float scan_information_gain = 10.0F;
-  std::uint16_t max_beams = 0;  ///< of any laser
+  std::uint16_t max_beams = 0;          ///< of any laser
   ScanMatcherConfig matcher;
   MotionNoise noise;
 };
@@ -56,9 +53,9 @@ class ParticleMapper final : public LocalMapper {
     ScanMatcher::Memory matcher;
     LiveGrid::Memory grids;
     Span<Particle> particles;
-    Span<Pose2> poses;       ///< particle by particle, a ring by scan number
-    Span<CellRect> rects;    ///< the part of the window that each scan has been continuously inside
-    Span<Sym3> covariances;  ///< of the best particle's match, a ring by scan number
+    Span<Pose2> poses;     ///< particle by particle, a ring by scan number
+    Span<CellRect> rects;  ///< the part of the window that each scan has been continuously inside
+    Span<Sym3> drifts;     ///< of the best particle's match, a ring by scan number
   };
   template <class A>
   static constexpr Memory carve(A& arena, const ParticleMapperConfig& config) {
@@ -88,7 +85,7 @@ class ParticleMapper final : public LocalMapper {
     return scans_.end() > config_.remembered_scans ? scans_.end() - config_.remembered_scans : 0;
   }
   Pose2 scan_pose(std::uint32_t number) const override { return poses(best_)[number % pose_capacity()]; }
-  Sym3 scan_covariance(std::uint32_t number) const override { return memory_.covariances[number % pose_capacity()]; }
+  Sym3 scan_drift(std::uint32_t number) const override { return memory_.drifts[number % pose_capacity()]; }
   const MapperStatistics& statistics() const override { return statistics_; }
 
  private:

@@ -22,6 +22,10 @@ struct ScanMatcherConfig {
   /// Weight of the whole scan: what it costs, in units of one half chi-squared, if every beam ends in free space. Beams
   /// of one scan share their errors, so it is far below the number of beams.
   float scan_weight = 120.0F;
+  /// What scan_information() takes a beam to be worth: deviation of its end from the wall it meets, and the share of
+  /// the beams that count as independent (neighbours share the errors of the map that they are compared with).
+  float point_sigma_m = 0.03F;
+  float independent_share = 0.2F;
   float min_inlier_share = 0.35F;  ///< of the beams must end near something solid for a match to count
 };
 
@@ -63,6 +67,12 @@ class ScanMatcher {
   /// Cost: max_iterations x points x 4 cells.
   MatchResult refine(const LiveGrid& grid, const Pose2& start, const Pose2& prior, const Sym3& prior_information) const;
 
+  /// What the scan alone says about a pose at which it was matched, in the pose's own frame (m, m, rad): each beam that
+  /// meets the map holds the pose along the normal of its wall, and not along the wall (Censi 2007). Along a plain
+  /// corridor or round a plain bend it says nothing. Normals come from the neighbouring beams, since the field's own
+  /// slope also sees the roughness of cells. Cost: points x 16.
+  Sym3 scan_information(const LiveGrid& grid, const Pose2& pose) const;
+
   /// Correlative search round the prior, then refine() from the best pose found and from the prior itself; the better
   /// one counts. Cost: (2 search_distance / (2 cells))^2 x angles x search_points cells.
   MatchResult search(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const;
@@ -70,6 +80,7 @@ class ScanMatcher {
  private:
   struct Linearised;
   Linearised linearise(const LiveGrid& grid, const GridPose& at, float x, float y, float theta) const;
+  std::size_t neighbour(std::size_t point, int direction, float cell_m) const;
   Pose2 correlate(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const;
 
   ScanMatcherConfig config_;
