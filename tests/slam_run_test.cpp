@@ -123,6 +123,7 @@ TEST_CASE("twice round a building: loops are closed and mend the trajectory; the
   host::MappingRun run(config_for(log), flash.flash(), {});
   run.map(log, {0}, {});
   CHECK(host::heap_counts().allocations == 0);
+  CHECK(host::heap_is_counted() != kSanitized);
   if (!host::heap_is_counted()) {
     MESSAGE("the heap is not counted under sanitizers");
   }

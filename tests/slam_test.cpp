@@ -11,6 +11,7 @@
 
 #include "host/heap_counter.hpp"
 #include "posix/flash_image.hpp"
+#include "tests/store_fixture.hpp"
 #include "tests/support/room.hpp"
 
 using namespace mellin;
@@ -421,6 +422,44 @@ TEST_CASE("a full collection loses submaps, counts them, and keeps the robot loc
   CHECK(machine->collection().size() == 3);
   CHECK(machine->statistics().submaps_lost > 0);
   CHECK(translation(between(machine->pose(), between(on_circle(0), on_circle(119)))) < 0.1);
+}
+
+TEST_CASE("the power may go at any moment: what was reported as stored is there after the restart") {
+  const Config config = small();
+  std::uint32_t with_submaps = 0;
+  for (std::uint64_t cut = 0; cut < 400; cut += cut < 12 ? 1 : 29) {
+    CAPTURE(cut);
+    test::TornFlash flash({4096, 64, 256});
+    mellin_port port = {};
+    port.flash = flash.flash();
+    flash.cut_after(cut, static_cast<std::uint32_t>(cut), cut % 2 == 1);
+    std::uint32_t stored = 0;
+    {
+      Machine before(config, port);
+      if (before.status == Status::ok) {
+        circle(*before, 0, 160);
+        REQUIRE(before->begin_flush() == Status::ok);
+        drain(*before);
+        stored = before->collection().statistics().stored;
+      } else {
+        CHECK(before.status == Status::device_error);
+      }
+    }
+    flash.restore();
+    Machine after(config, port);
+    REQUIRE(after.status == Status::ok);
+    CHECK(after->collection().size() >= stored);
+    CHECK(after->collection().size() <= stored + 1);  // the commit itself may have been cut
+    for (SubmapId id = 0; id < after->collection().size(); ++id) {
+      CHECK(after->store().grid_crc32(id).ok());
+    }
+    with_submaps += stored > 0 ? 1U : 0U;
+    const std::uint32_t found = after->collection().size();
+    circle(*after, 0, 100);
+    CHECK(after->collection().size() > found);
+    CHECK(flash.violations() == 0);
+  }
+  CHECK(with_submaps > 3);
 }
 
 TEST_CASE("library calls leave the heap alone") {
