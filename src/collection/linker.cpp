@@ -7,7 +7,7 @@ const char* to_string(LinkReason reason) {
     case LinkReason::none:
       return "";
     case LinkReason::weak:
-      return "weak agreement";
+      return "weak or undetermined match";
     case LinkReason::waiting:
       return "waiting for a second witness";
     case LinkReason::contradicts_map:
@@ -59,8 +59,22 @@ struct Linker::Query {
   }
 };
 
+namespace {
+
+/// Of the covariance of the position.
+double larger_eigenvalue(const Sym3& covariance) {
+  const double mean = 0.5 * (covariance.xx + covariance.yy);
+  const double half = 0.5 * (covariance.xx - covariance.yy);
+  return mean + sqrt(half * half + covariance.xy * covariance.xy);
+}
+
+}  // namespace
+
 bool Linker::worth_keeping(const PlaceHypothesis& place) const {
-  return place.agreement >= config_.min_agreement && place.overlap >= config_.min_overlap;
+  const double m = static_cast<double>(config_.max_sigma_m);
+  const double rad = static_cast<double>(config_.max_sigma_rad);
+  return place.agreement >= config_.min_agreement && place.overlap >= config_.min_overlap &&
+         larger_eigenvalue(place.covariance) <= m * m && place.covariance.tt <= rad * rad;
 }
 
 void Linker::add(NodeId a, NodeId b, const PlaceHypothesis& place) {

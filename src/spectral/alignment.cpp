@@ -143,6 +143,18 @@ Sym3 with_floor(const Sym3& m, double deviation_xy, double deviation_theta) {
   return {m.xx - r0.x, m.xy - r1.x, m.xt - r2.x, m.yy - r1.y, m.yt - r2.y, m.tt - r2.theta};
 }
 
+/// `m` less as much of `part` as leaves it positive definite, in eighths.
+Sym3 less(const Sym3& m, const Sym3& part) {
+  Sym3 inverse;
+  for (int eighths = 8; eighths > 0; --eighths) {
+    const Sym3 rest = m + scale(part, -0.125 * eighths);
+    if (invert(rest, inverse)) {
+      return rest;
+    }
+  }
+  return m;
+}
+
 }  // namespace
 
 Status Alignment::init(const AlignmentConfig& config, const Memory& memory) {
@@ -432,7 +444,9 @@ void Alignment::add_evidence() {
       ++evidence_.inliers;
       evidence_.squares += static_cast<double>(at.distance_m * at.distance_m);
       // Witnesses speak in b's frame: it is the points' own on the first way, that of the field on the second.
-      add_witness(evidence_.information, backward_ ? there : p, weight);
+      const AlignmentPoint& w = backward_ ? there : p;
+      add_witness(evidence_.across, w, weight);
+      add_witness(evidence_.along, {w.x, w.y, -w.normal_y, w.normal_x}, weight);
     }
   }
 }
@@ -447,7 +461,8 @@ void Alignment::summarise() {
       hypotenuse(static_cast<double>(config_.floor_theta_rad), 0.5 * static_cast<double>(result_.disagreement_rad));
   // The fewer points find an obstacle, the more of those that do have found it by chance.
   const double trust = static_cast<double>(result_.inlier_share) * static_cast<double>(result_.inlier_share);
-  result_.information = with_floor(scale(e.information, trust), xy, theta);
+  const double slant = static_cast<double>(config_.normal_sigma_rad) * static_cast<double>(config_.normal_sigma_rad);
+  result_.information = with_floor(scale(less(e.across, scale(e.along, slant)), trust), xy, theta);
   stage_ = Stage::done;
 }
 

@@ -77,6 +77,8 @@ void visit_settings(C& c, Visit&& visit) {
   visit("linker.single_agreement", c.collection.linker.single_agreement);
   visit("linker.min_agreement", c.collection.linker.min_agreement);
   visit("linker.min_overlap", c.collection.linker.min_overlap);
+  visit("linker.max_sigma_m", c.collection.linker.max_sigma_m);
+  visit("linker.max_sigma_rad", c.collection.linker.max_sigma_rad);
   visit("linker.warp_sigma_m", c.collection.linker.warp_sigma_m);
   visit("linker.warp_sigma_rad", c.collection.linker.warp_sigma_rad);
   visit("linker.information_share", c.collection.linker.information_share);

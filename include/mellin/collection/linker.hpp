@@ -31,6 +31,10 @@ struct LinkerConfig {
   float single_agreement = 0.5F;  ///< … if the submaps agree at least so well
   float min_agreement = 0.4F;     ///< below, a hypothesis is not evidence at all
   float min_overlap = 0.1F;
+  /// A match that leaves the pose less determined than this along any direction is none: in a plain corridor or bend
+  /// two submaps fit at any offset, and the one that was found says nothing.
+  float max_sigma_m = 0.25F;
+  float max_sigma_rad = 0.05F;
   /// What registration does not know of: submaps are not quite rigid. Added to its covariance.
   float warp_sigma_m = 0.04F;
   float warp_sigma_rad = 0.008F;
@@ -42,7 +46,7 @@ struct LinkerConfig {
 /// Why a hypothesis became an edge, or did not.
 enum class LinkReason : std::uint8_t {
   none,
-  weak,              ///< too little agreement or overlap
+  weak,              ///< too little agreement or overlap, or the match does not determine the pose
   waiting,           ///< agrees with the graph, waits for a second witness
   contradicts_map,   ///< outside what the graph allows
   confirmed_by_map,  ///< accepted: the graph knows the place and agrees

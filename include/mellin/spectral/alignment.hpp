@@ -29,6 +29,9 @@ struct AlignmentConfig {
   float final_m = 0.15F;              ///< reach in the last stage: points further away are outliers
   float point_sigma_m = 0.05F;        ///< deviation of a point from its obstacle where the pose is right …
   float correlation_m = 0.5F;         ///< … correlated over this length of wall: as many points are one witness
+  /// Deviation of a wall's normal as the cells show it. It lets walls seem to hold the pose along themselves, which is
+  /// taken off again: along a corridor or round a bend nothing is left.
+  float normal_sigma_rad = 0.15F;
   float floor_xy_m = 0.02F;        ///< deviation that no number of points gets below: submaps are not quite rigid …
   float floor_theta_rad = 0.004F;  ///< … the same of the heading
 };
@@ -109,7 +112,8 @@ class Alignment {
     std::uint32_t shared = 0;  ///< points that fall where the other submap observed
     std::uint32_t inliers = 0;
     double squares = 0.0;  ///< of the inliers' distances, m^2
-    Sym3 information;      ///< over e on the right of a_T_b
+    Sym3 across;           ///< stiffness of the walls across themselves, over e on the right of a_T_b
+    Sym3 along;            ///< the same of the walls if they held along themselves
   };
 
   void start_way(GridView onto, GridView from, const Pose2& onto_T_from, float reach_m);
