@@ -50,9 +50,10 @@ class Slam {
 
   /// Builds the system in `memory` (aligned to kArenaAlignment, required_bytes(config) long; it stays the caller's, and
   /// the system lives as long). `fast` may hold what required_memory(config).fast says, and memory the rest. What the
-  /// port's flash holds is restored in the first calls of work(); a blank flash is formatted. A first session begins.
-  /// Statuses: ok; invalid_config (the log says which field); insufficient_memory (the log says how many bytes lack);
-  /// version_mismatch, bad_data, device_error of the store: the flash is left as it was.
+  /// port's flash holds is restored before this returns; a blank flash is formatted. A first session begins.
+  /// Statuses: ok; invalid_config (the log says which field); invalid_argument where memory is not aligned;
+  /// insufficient_memory (the log says how many bytes lack); full where the flash holds submaps of max_sessions
+  /// sessions already; version_mismatch, bad_data, device_error of the store: the flash is left as it was.
   static Result<Slam*> create(const Config& config, Span<std::byte> memory, const mellin_port& port,
                               Span<std::byte> fast = {});
 
@@ -72,7 +73,8 @@ class Slam {
   Status begin_flush();
 
   /// A new mapping session (the robot was carried, or restarted): the live map starts empty, with the robot at the
-  /// given pose of a frame of its own. Flush first. busy: work is pending. full: no room for another session.
+  /// given pose of a frame of its own. Flush first. invalid_argument: a pose that is not finite, or beyond
+  /// ParticleMapper::kReach_m. busy: work is pending. full: no room for another session.
   Status new_session(const Pose2& session_T_base = {});
 
   /// The live pose: smooth, in the session's frame.

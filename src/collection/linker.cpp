@@ -25,7 +25,8 @@ const char* to_string(LinkReason reason) {
 }
 
 bool share_scans(const NodeScans& a, const NodeScans& b) {
-  return a.session == b.session && a.first < b.first + b.count && b.first < a.first + a.count;
+  return a.session == b.session && a.first < std::uint64_t{b.first} + b.count &&
+         b.first < std::uint64_t{a.first} + a.count && a.count > 0 && b.count > 0;
 }
 
 struct Linker::Query {
@@ -130,7 +131,7 @@ std::size_t Linker::decide(PoseGraph& graph, Optimiser& optimiser, Span<const No
     }
   }
   if (alone != 0) {
-    return accept(graph, alone, LinkReason::confirmed_by_map, context, decided);
+    return accept(graph, scans, alone, LinkReason::confirmed_by_map, context, decided);
   }
   for (std::size_t i = pending_.size(); i-- > 0;) {
     if ((eligible >> i & 1U) == 0) {
@@ -138,7 +139,7 @@ std::size_t Linker::decide(PoseGraph& graph, Optimiser& optimiser, Span<const No
     }
     const std::uint64_t set = confirmed(graph, query, i, eligible);
     if (set != 0) {
-      return accept(graph, set, LinkReason::confirmed_by_set, context, decided);
+      return accept(graph, scans, set, LinkReason::confirmed_by_set, context, decided);
     }
   }
   return 0;
@@ -176,7 +177,8 @@ std::uint64_t Linker::confirmed(const PoseGraph& graph, Query& query, std::size_
   return members;
 }
 
-std::size_t Linker::accept(PoseGraph& graph, std::uint64_t members, LinkReason reason, void* context, Decided decided) {
+std::size_t Linker::accept(PoseGraph& graph, Span<const NodeScans> scans, std::uint64_t members, LinkReason reason,
+                           void* context, Decided decided) {
   std::size_t added = 0;
   for (std::size_t i = pending_.size(); i-- > 0;) {
     if ((members >> i & 1U) == 0) {
@@ -186,7 +188,7 @@ std::size_t Linker::accept(PoseGraph& graph, std::uint64_t members, LinkReason r
     const LoopHypothesis& h = link.hypothesis;
     Sym3 information;
     if (information_from_covariance(h.measured.a_T_b, h.measured.covariance, information)) {
-      const EdgeKind kind = graph.component(h.a) == graph.component(h.b) ? EdgeKind::loop : EdgeKind::merge;
+      const EdgeKind kind = scans[h.a].session == scans[h.b].session ? EdgeKind::loop : EdgeKind::merge;
       const Result<EdgeId> edge = graph.add_edge(h.a, h.b, kind, h.measured.a_T_b,
                                                  scale(information, static_cast<double>(config_.information_share)));
       if (!edge.ok()) {

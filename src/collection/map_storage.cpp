@@ -49,7 +49,7 @@ void MapCollection::step_store() {
     case Stage::store_node:
       if (odometry_edge_ != kNoId) {
         stage_ = Stage::store_edge;
-        next = store_->put_blob(kEdgeRecord, odometry_edge_, edge_record(odometry_edge_));
+        next = store_->put_blob(kEdgeRecord, id, edge_record(odometry_edge_));
         break;
       }
       stage_ = Stage::commit;
@@ -90,6 +90,7 @@ void MapCollection::begin_flush() {
     return;
   }
   record_ = 0;
+  loops_flushed_ = 0;
   stage_ = Stage::flush;
   flush_next();
 }
@@ -99,7 +100,10 @@ void MapCollection::flush_next() {
   if (record_ < count_) {
     status = store_->put_blob(kNodeRecord, record_, node_record(record_));
   } else if (record_ < count_ + graph_.edge_count()) {
-    status = store_->put_blob(kEdgeRecord, record_ - count_, edge_record(record_ - count_));
+    const EdgeId edge = record_ - count_;
+    const bool odometry = graph_.edge(edge).kind == EdgeKind::odometry;
+    const std::uint32_t id = odometry ? graph_.edge(edge).b : kFirstLoopRecord + loops_flushed_++;
+    status = store_->put_blob(kEdgeRecord, id, edge_record(edge));
   } else {
     status = store_->commit();
   }

@@ -81,7 +81,12 @@ bool read_edge_record(Span<const std::uint8_t> bytes, Edge& edge) {
   edge.a_T_b = {get_double(at + 12), get_double(at + 20), get_double(at + 28)};
   edge.information = {get_double(at + 36), get_double(at + 44), get_double(at + 52),
                       get_double(at + 60), get_double(at + 68), get_double(at + 76)};
-  return is_finite(edge.a_T_b);
+  const Sym3& m = edge.information;
+  bool finite = is_finite(edge.a_T_b);
+  for (const double value : {m.xx, m.xy, m.xt, m.yy, m.yt, m.tt}) {
+    finite = finite && is_finite(value);
+  }
+  return finite;
 }
 
 }  // namespace mellin

@@ -69,11 +69,13 @@ void ParticleMapper::reset(const Pose2& session_T_base) {
   }
 }
 
+bool ParticleMapper::within_reach(const Pose2& pose) {
+  return magnitude(pose.x) < kReach_m && magnitude(pose.y) < kReach_m && magnitude(pose.theta) < kReach_m;
+}
+
 bool ParticleMapper::acceptable(const Scan& scan) const {
   return scan.laser < kMaxLasers && lasers_[scan.laser].beams > 0 &&
-         scan.ranges_m.size() == lasers_[scan.laser].beams && is_finite(scan.odom_T_base) &&
-         magnitude(scan.odom_T_base.x) < 1e6 && magnitude(scan.odom_T_base.y) < 1e6 &&
-         magnitude(scan.odom_T_base.theta) < 1e6;
+         scan.ranges_m.size() == lasers_[scan.laser].beams && within_reach(scan.odom_T_base);
 }
 
 Sym3 ParticleMapper::prior_information(const Pose2& motion) const {
@@ -97,6 +99,10 @@ Result<ScanOutcome> ParticleMapper::add(const Scan& scan) {
   const Pose2 motion = first ? Pose2{} : between(last_odometry_, scan.odom_T_base);
   const Pose2 since_taken = first ? Pose2{} : between(taken_odometry_, scan.odom_T_base);
   const Pose2 predicted = compose(tracked_, motion);
+  if (!within_reach(predicted)) {  // odometry that jumps adds up
+    ++statistics_.refused;
+    return Status::bad_data;
+  }
   last_odometry_ = scan.odom_T_base;
   scans_.stage(scan);
   (void)matcher_.set_scan(scans_.ranges(scans_.end()), scans_.directions(scans_.end()),

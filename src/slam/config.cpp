@@ -3,6 +3,9 @@
 namespace mellin {
 namespace {
 
+/// A laser stands on the robot; the bound keeps cell arithmetic within its range.
+constexpr double kMaxMount_m = 10.0;
+
 Status refuse(const Log& log, const char* field, double value, const char* expected) {
   log.write(MELLIN_LOG_WARNING, LogLine() << "config: " << field << " is " << value << ", expected " << expected);
   return Status::invalid_config;
@@ -25,10 +28,80 @@ Status validate_laser(const LaserConfig& laser, float cell_m, const Log& log) {
     return refuse(log, "angle_increment_rad", static_cast<double>(laser.angle_increment_rad),
                   "a field of view of one turn at most");
   }
-  if (!is_finite(laser.base_T_laser) || !is_finite(static_cast<double>(laser.angle_min_rad))) {
-    return refuse(log, "base_T_laser", laser.base_T_laser.x, "finite numbers");
+  if (!is_finite(static_cast<double>(laser.angle_min_rad))) {
+    return refuse(log, "angle_min_rad", static_cast<double>(laser.angle_min_rad), "a finite number");
+  }
+  const Pose2& mount = laser.base_T_laser;
+  if (!is_finite(mount) || !(translation(mount) <= kMaxMount_m)) {
+    return refuse(log, "base_T_laser", is_finite(mount) ? translation(mount) : mount.x, "within 10 m of the base");
   }
   return Status::ok;
+}
+
+/// A number with its limits. Written so that NaN is outside.
+struct Limits {
+  const char* field;
+  float value;
+  float least;  ///< 0 itself is allowed only where `zero` says so
+  float most;
+  bool zero;
+  const char* expected;
+};
+
+Status validate_all(Span<const Limits> fields, const Log& log) {
+  for (const Limits& f : fields) {
+    const bool in_range = f.value >= f.least && f.value <= f.most && (f.zero || f.value > 0.0F);
+    if (!in_range) {
+      return refuse(log, f.field, static_cast<double>(f.value), f.expected);
+    }
+  }
+  return Status::ok;
+}
+
+Status validate_numbers(const Config& c, const Log& log) {
+  const ParticleMapperConfig& mapper = c.mapper;
+  const MotionNoise& noise = mapper.noise;
+  const OdometryEdgeNoise& edge = c.collection.odometry;
+  constexpr float kMuch = 1e6F;
+  const char* const over_zero = "over 0";
+  const char* const not_negative = "0 or more";
+  const Limits fields[] = {
+      {"take_distance_m", mapper.take_distance_m, 0.0F, kMuch, false, over_zero},
+      {"take_angle_rad", mapper.take_angle_rad, 0.0F, kMuch, false, over_zero},
+      {"resample_share", mapper.resample_share, 0.0F, 1.0F, true, "0 to 1"},
+      {"proposal_spread", mapper.proposal_spread, 0.0F, kMuch, true, not_negative},
+      {"distance_base_m", noise.distance_base_m, 1e-5F, kMuch, false, "at least 0.00001"},
+      {"distance_per_m", noise.distance_per_m, 0.0F, kMuch, true, not_negative},
+      {"distance_per_rad", noise.distance_per_rad, 0.0F, kMuch, true, not_negative},
+      {"angle_base_rad", noise.angle_base_rad, 1e-5F, kMuch, false, "at least 0.00001"},
+      {"angle_per_m", noise.angle_per_m, 0.0F, kMuch, true, not_negative},
+      {"angle_per_rad", noise.angle_per_rad, 0.0F, kMuch, true, not_negative},
+      {"search_distance_m", mapper.matcher.search_distance_m, 0.0F, 1000.0F * c.cell_m, true, "0 to 1000 cells"},
+      {"search_angle_rad", mapper.matcher.search_angle_rad, 0.0F, 3.1416F, true, "0 to half a turn"},
+      {"search_angle_step_rad", mapper.matcher.search_angle_step_rad, 0.001F, 3.1416F, false, "0.001 to half a turn"},
+      {"scan_weight", mapper.matcher.scan_weight, 0.0F, kMuch, false, over_zero},
+      {"point_sigma_m", mapper.matcher.point_sigma_m, 1e-5F, kMuch, false, "at least 0.00001"},
+      {"independent_share", mapper.matcher.independent_share, 0.0F, 1.0F, false, "over 0, at most 1"},
+      {"min_inlier_share", mapper.matcher.min_inlier_share, 0.0F, 1.0F, true, "0 to 1"},
+      {"max_path_m", c.submaps.max_path_m, 0.0F, kMuch, false, over_zero},
+      {"every_path_m", c.submaps.every_path_m, 0.0F, kMuch, false, over_zero},
+      {"max_drift_m", c.submaps.max_drift_m, 0.0F, kMuch, true, not_negative},
+      {"max_drift_rad", c.submaps.max_drift_rad, 0.0F, kMuch, true, not_negative},
+      {"drift_share", c.submaps.drift_share, 0.0F, 1.0F, true, "0 to 1"},
+      {"base_m", edge.base_m, 1e-5F, kMuch, false, "at least 0.00001"},
+      {"per_m", edge.per_m, 0.0F, kMuch, true, not_negative},
+      {"base_rad", edge.base_rad, 1e-5F, kMuch, false, "at least 0.00001"},
+      {"per_m_rad", edge.per_m_rad, 0.0F, kMuch, true, not_negative},
+  };
+  return validate_all(fields, log);
+}
+
+/// Whether halving `side` leads to `small`.
+bool halves_to(std::uint32_t side, std::uint32_t small) {
+  while (side > small && side % 2 == 0) {
+    side /= 2;
+  }
+  return side == small;
 }
 
 }  // namespace
@@ -60,17 +133,27 @@ Status validate(const Config& given, Log log) {
   if (c.mapper.particles < 1 || c.mapper.particles > 1000) {
     return refuse(log, "particles", c.mapper.particles, "1 to 1000");
   }
-  if (c.mapper.spare_scans < 1) {
-    return refuse(log, "spare_scans", c.mapper.spare_scans, "at least 1");
+  if (c.mapper.spare_scans < 1 || c.mapper.spare_scans + std::uint32_t{c.remembered_scans} > 65535) {
+    return refuse(log, "spare_scans", c.mapper.spare_scans, "at least 1, with remembered_scans at most 65535");
   }
   if (c.mapper.matcher.search_points < 1) {
     return refuse(log, "search_points", c.mapper.matcher.search_points, "at least 1");
   }
-  if (!(c.mapper.take_distance_m > 0.0F) || !(c.mapper.take_angle_rad > 0.0F)) {
-    return refuse(log, "take_distance_m", static_cast<double>(c.mapper.take_distance_m), "over 0");
+  const Status numbers = validate_numbers(c, log);
+  if (numbers != Status::ok) {
+    return numbers;
   }
-  if (c.submaps.every_scans < 1 || c.submaps.band_rows < 1) {
+  if (c.submaps.every_scans < 1) {
     return refuse(log, "every_scans", c.submaps.every_scans, "at least 1");
+  }
+  if (c.submaps.band_rows < 1) {
+    return refuse(log, "band_rows", c.submaps.band_rows, "at least 1");
+  }
+  if (c.screening_side < 16 || !halves_to(c.side, c.screening_side)) {
+    return refuse(log, "screening_side", c.screening_side, "side over a power of two, at least 16");
+  }
+  if (c.registration_side < 16 || !halves_to(c.side, c.registration_side)) {
+    return refuse(log, "registration_side", c.registration_side, "side over a power of two, at least 16");
   }
   if (c.class_side < 16 || c.side % c.class_side != 0) {
     return refuse(log, "class_side", c.class_side, "a divisor of side, at least 16");

@@ -172,7 +172,7 @@ Status Slam::begin_flush() {
 }
 
 Status Slam::new_session(const Pose2& session_T_base) {
-  if (!is_finite(session_T_base)) {
+  if (!ParticleMapper::within_reach(session_T_base)) {
     return Status::invalid_argument;
   }
   if (pending()) {

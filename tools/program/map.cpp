@@ -92,6 +92,17 @@ void remark_on(const host::Log& log, std::vector<std::string>& remarks) {
   }
 }
 
+/// What is wrong with a `key=value` of the command line; empty where nothing is.
+std::string setting_error(const std::string& assignment) {
+  try {
+    Config config;
+    host::apply_setting(config, assignment);
+  } catch (const std::invalid_argument& error) {
+    return error.what();
+  }
+  return {};
+}
+
 void run_map(const MapOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   Config config = make_config(options);
@@ -170,7 +181,7 @@ void add_map(CLI::App& app) {
       ->capture_default_str()
       ->check(CLI::IsMember({"desktop", "micro", "nano"}));
   map->add_option("--config", options->config_file, "File of key = value lines")->check(CLI::ExistingFile);
-  map->add_option("--set", options->settings, "key=value; may be repeated");
+  map->add_option("--set", options->settings, "key=value; may be repeated")->check(setting_error);
   map->add_option("--seed", options->seed, "Seed of all random numbers")->capture_default_str();
   map->add_option("--threads", options->threads, "Threads; results do not depend on it, and one is used at present")
       ->check(CLI::PositiveNumber);

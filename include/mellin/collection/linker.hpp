@@ -104,7 +104,8 @@ class Linker {
   struct Query;
   bool known_well(const Sym3& covariance) const;
   std::uint64_t confirmed(const PoseGraph& graph, Query& query, std::size_t index, std::uint64_t eligible);
-  std::size_t accept(PoseGraph& graph, std::uint64_t members, LinkReason reason, void* context, Decided decided);
+  std::size_t accept(PoseGraph& graph, Span<const NodeScans> scans, std::uint64_t members, LinkReason reason,
+                     void* context, Decided decided);
 
   LinkerConfig config_;
   List<PendingLink> pending_;

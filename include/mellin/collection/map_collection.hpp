@@ -229,9 +229,10 @@ class MapCollection {
   SubmapId other_ = 0;           ///< next to be screened, or being registered
   List<Candidate> candidates_;
   std::uint8_t registered_ = 0;
-  bool evidence_ = false;         ///< a hypothesis came in since the last judgement
-  std::uint32_t record_ = 0;      ///< next to be flushed or restored
-  EdgeId odometry_edge_ = kNoId;  ///< of the submap under way
+  bool evidence_ = false;            ///< a hypothesis came in since the last judgement
+  std::uint32_t record_ = 0;         ///< next to be flushed or restored
+  std::uint32_t loops_flushed_ = 0;  ///< loop and merge edges among those that this flush has put
+  EdgeId odometry_edge_ = kNoId;     ///< of the submap under way
 };
 
 }  // namespace mellin

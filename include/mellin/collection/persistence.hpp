@@ -13,7 +13,11 @@ namespace mellin {
 /// Kinds of blobs in the store.
 inline constexpr std::uint8_t kDigestRecord = 1;  ///< id: submap
 inline constexpr std::uint8_t kNodeRecord = 2;    ///< id: submap
-inline constexpr std::uint8_t kEdgeRecord = 3;    ///< id: edge
+/// An odometry edge has the id of its newer submap, of which it is the only one; loop and merge edges are counted from
+/// kFirstLoopRecord on. The graph's own numbers would not do: loop edges lie between the odometry edges and are stored
+/// later, so that after a power cut the graph counts otherwise than the records.
+inline constexpr std::uint8_t kEdgeRecord = 3;
+inline constexpr std::uint32_t kFirstLoopRecord = 0x80000000U;
 
 /// 24 bytes: x, y, theta as IEEE 754 doubles.
 inline constexpr std::size_t kNodeRecordBytes = 24;

@@ -40,8 +40,8 @@ class LocalMapper {
   /// Forgets everything; the robot starts at the given pose.
   virtual void reset(const Pose2& session_T_base) = 0;
 
-  /// Takes the next scan. bad_data: an odometry that is not finite, a laser that is not configured, a wrong number of
-  /// ranges; the scan is then ignored. Cost bounded by the configuration.
+  /// Takes the next scan. bad_data: an odometry that is not finite or leads out of the mapper's reach, a laser that is
+  /// not configured, a wrong number of ranges; the scan is then ignored. Cost bounded by the configuration.
   virtual Result<ScanOutcome> add(const Scan& scan) = 0;
 
   virtual Pose2 pose() const = 0;

@@ -88,6 +88,12 @@ class ParticleMapper final : public LocalMapper {
   Sym3 scan_drift(std::uint32_t number) const override { return memory_.drifts[number % pose_capacity()]; }
   const MapperStatistics& statistics() const override { return statistics_; }
 
+  /// Poses lie within so much of their frame's origin: cells are counted in 32 bits. A scan whose odometry leads
+  /// beyond is bad_data.
+  static constexpr double kReach_m = 1e6;
+  /// Whether a pose is finite and within that reach; turns count up to kReach_m radians.
+  static bool within_reach(const Pose2& pose);
+
  private:
   static constexpr ScanMemoryConfig scan_memory_config(const ParticleMapperConfig& config) {
     return {static_cast<std::uint16_t>(config.remembered_scans + config.spare_scans), config.max_beams};

@@ -1,0 +1,382 @@
+// The map collection over fake matchers: which pairs it looks at, what it keeps, and what it finds again after a
+// restart. That fakes fit in shows that the spectral method is one of several that could.
+#include <doctest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <memory>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "mellin/collection/map_collection.hpp"
+#include "posix/flash_image.hpp"
+#include "tests/store_fixture.hpp"
+
+using namespace mellin;
+
+namespace {
+
+using Pair = std::pair<std::uint32_t, std::uint32_t>;
+constexpr std::uint16_t kSide = 64;
+
+Pose2 true_pose(SubmapId id) { return {3.0 * std::cos(0.5 * id), 3.0 * std::sin(0.5 * id), 0.1 * id}; }
+
+PlaceHypothesis place(const Pose2& a_T_b, float agreement) {
+  PlaceHypothesis p;
+  p.a_T_b = a_T_b;
+  p.covariance = diagonal(1e-4, 1e-4, 1e-6);
+  p.agreement = agreement;
+  p.overlap = 0.6F;
+  p.peak = 0.5F;
+  return p;
+}
+
+/// Compares by a table instead of pictures; a digest is four bytes of the submap's mark.
+class FakeDigests final : public DigestMatcher {
+ public:
+  std::function<float(std::uint32_t, std::uint32_t)> agreement = [](std::uint32_t, std::uint32_t) { return 0.0F; };
+  std::vector<Pair> compared;
+  std::vector<std::uint8_t> digests = std::vector<std::uint8_t>(4 * 256);
+  int restored = 0;
+
+  Status begin_describe(std::uint32_t index, const GridView& grid) override {
+    for (std::size_t i = 0; i < 4; ++i) {
+      digests[4 * index + i] = static_cast<std::uint8_t>(grid.cells[0] + i);
+    }
+    return start();
+  }
+  Status begin_restore(std::uint32_t index, Span<const std::uint8_t> digest) override {
+    if (digest.size() != 4) {
+      return Status::invalid_argument;
+    }
+    std::copy(digest.begin(), digest.end(), digests.begin() + 4 * index);
+    ++restored;
+    return start();
+  }
+  Status begin_compare(std::uint32_t a, std::uint32_t b) override {
+    compared.emplace_back(a, b);
+    hypotheses_.clear();
+    if (agreement(a, b) > 0.0F) {
+      (void)hypotheses_.push(place(between(true_pose(a), true_pose(b)), agreement(a, b)));
+    }
+    return start();
+  }
+  bool step() override { return --steps_ == 0; }
+  const PlaceHypotheses& hypotheses() const override { return hypotheses_; }
+  Span<const std::uint8_t> digest_bytes(std::uint32_t index) const override { return {digests.data() + 4 * index, 4}; }
+
+ private:
+  Status start() {
+    steps_ = 3;
+    return Status::ok;
+  }
+  int steps_ = 0;
+  PlaceHypotheses hypotheses_;
+};
+
+/// Knows submaps by the mark in their first cell.
+class FakeGrids final : public GridMatcher {
+ public:
+  std::function<float(std::uint32_t, std::uint32_t)> agreement = [](std::uint32_t, std::uint32_t) { return 0.9F; };
+  std::vector<Pair> registered;
+
+  Status begin(const GridView& a, const GridView& b) override {
+    registered.emplace_back(a.cells[0], b.cells[0]);
+    hypotheses_.clear();
+    (void)hypotheses_.push(
+        place(between(true_pose(a.cells[0]), true_pose(b.cells[0])), agreement(a.cells[0], b.cells[0])));
+    steps_ = 2;
+    return Status::ok;
+  }
+  bool step() override { return --steps_ == 0; }
+  const PlaceHypotheses& hypotheses() const override { return hypotheses_; }
+
+ private:
+  int steps_ = 0;
+  PlaceHypotheses hypotheses_;
+};
+
+struct Bench {
+  FakeDigests digests;
+  FakeGrids grids;
+  CollectionConfig config;
+  std::unique_ptr<test::TestStore> store;
+  std::vector<std::uint64_t> words;
+  MapCollection map;
+  std::vector<PairEvent> events;
+
+  /// Mounts what the flash holds, or formats it.
+  explicit Bench(const mellin_flash& flash, CollectionConfig wanted = {}, std::uint16_t slots = 2) : config(wanted) {
+    config.max_submaps = 40;
+    config.max_sessions = 6;
+    config.digest_bytes = 4;
+    StoreConfig store_config = test::small_config(kSide);
+    store_config.max_submaps = 40;
+    store_config.max_blobs = 300;
+    store_config.grid_slots = slots;
+    store = std::make_unique<test::TestStore>(store_config, flash);
+    REQUIRE(store->init_status == Status::ok);
+    if (store->store.keeps_data()) {
+      const Status status = store->store.mount();
+      REQUIRE((status == Status::not_found ? store->store.format() : status) == Status::ok);
+    }
+    MeasureArena measured;
+    (void)MapCollection::carve(measured, config);
+    words.resize(measured.use().total() / 8);
+    Arena arena({reinterpret_cast<std::byte*>(words.data()), words.size() * 8});
+    REQUIRE(map.init(config, MapCollection::carve(arena, config), digests, grids, store->store, {}, Log()) ==
+            Status::ok);
+    map.observe(
+        {this, [](void* context, const PairEvent& event) { static_cast<Bench*>(context)->events.push_back(event); }});
+    drain();
+  }
+  void drain() {
+    for (int i = 0; i < 1000000 && !map.idle(); ++i) {
+      map.step();
+    }
+    REQUIRE(map.idle());
+  }
+  void session(std::uint8_t number) {
+    SessionId id;
+    id.bytes[0] = number;
+    REQUIRE(map.begin_session(id) == Status::ok);
+  }
+  /// A submap at its true pose, off by `error`; scans from `first_scan` on.
+  void insert(std::uint32_t first_scan, const Pose2& error = {}) {
+    Result<SlotHandle> slot = store->store.slots().acquire_free();
+    REQUIRE(slot.ok());
+    for (std::uint8_t& cell : store->store.slots().cells(slot.value())) {
+      cell = 0;
+    }
+    store->store.slots().cells(slot.value())[0] = static_cast<std::uint8_t>(map.size());
+    SubmapHeader header;
+    header.session_T_submap = compose(error, true_pose(map.size()));
+    header.first_scan = first_scan;
+    header.scan_count = 40;
+    REQUIRE(map.insert(header, slot.value(), Sym3{}).ok());
+    CHECK(slot.value().empty());  // taken over
+    drain();
+    CHECK(store->store.slots().pinned() == 0);
+  }
+  std::size_t edges(EdgeKind kind) const {
+    std::size_t count = 0;
+    for (EdgeId id = 0; id < map.graph().edge_count(); ++id) {
+      count += map.graph().edge(id).kind == kind && map.graph().edge(id).enabled ? 1U : 0U;
+    }
+    return count;
+  }
+};
+
+bool shares(std::uint32_t a, std::uint32_t b) { return b - a < 4; }  // 40 scans each, 10 of them new
+
+}  // namespace
+
+TEST_CASE("each pair that shares no scans is screened once, as it comes, and no other") {
+  posix::RamFlash flash({4096, 256, 256});
+  Bench bench(flash.flash());
+  bench.session(1);
+  for (std::uint32_t i = 0; i < 12; ++i) {
+    bench.insert(10 * i);
+  }
+  bench.session(2);
+  bench.insert(0);  // the same numbers, but of another session
+  std::vector<Pair> expected;
+  for (std::uint32_t b = 0; b < 13; ++b) {
+    for (std::uint32_t a = 0; a < b; ++a) {
+      if (b == 12 || !shares(a, b)) {
+        expected.emplace_back(a, b);
+      }
+    }
+  }
+  CHECK(bench.digests.compared == expected);
+  CHECK(bench.map.statistics().pairs_possible == expected.size());
+  CHECK(bench.map.statistics().pairs_screened == expected.size());
+  CHECK(bench.grids.registered.empty());
+  REQUIRE(bench.events.size() == expected.size());
+  for (const PairEvent& event : bench.events) {
+    CHECK(event.stage == PairEvent::Stage::screened);
+    CHECK_FALSE(event.accepted);
+    CHECK(event.between_sessions == (event.b == 12));
+  }
+  CHECK(bench.map.graph().component_count() == 2);
+  CHECK(bench.map.component(12) == 12);
+  CHECK(bench.edges(EdgeKind::odometry) == 11);
+}
+
+TEST_CASE("of the pairs that look alike the best are registered, best first, one a place") {
+  posix::RamFlash flash({4096, 256, 256});
+  CollectionConfig config;
+  config.candidates = 3;
+  config.candidate_agreement = 0.3F;
+  Bench bench(flash.flash(), config);
+  // Like random numbers, but a function of the pair.
+  bench.digests.agreement = [](std::uint32_t a, std::uint32_t b) {
+    return static_cast<float>((a * 37 + b * 101 + a * b * 13) % 97) / 97.0F;
+  };
+  bench.grids.agreement = [](std::uint32_t, std::uint32_t) { return 0.1F; };  // never evidence
+  bench.session(1);
+  for (std::uint32_t i = 0; i < 30; ++i) {
+    bench.insert(10 * i);
+  }
+  std::vector<Pair> expected;
+  for (std::uint32_t b = 0; b < 30; ++b) {
+    std::vector<std::uint32_t> left;
+    for (std::uint32_t a = 0; a < b && !shares(a, b); ++a) {
+      if (bench.digests.agreement(a, b) >= 0.3F) {
+        left.push_back(a);
+      }
+    }
+    for (int k = 0; k < 3 && !left.empty(); ++k) {
+      const std::uint32_t best = *std::max_element(left.begin(), left.end(), [&](std::uint32_t x, std::uint32_t y) {
+        return bench.digests.agreement(x, b) < bench.digests.agreement(y, b);
+      });
+      expected.emplace_back(best, b);
+      std::erase_if(left, [&](std::uint32_t a) { return a + 3 >= best && a <= best + 3; });
+    }
+  }
+  REQUIRE(expected.size() > 40);
+  CHECK(bench.grids.registered == expected);  // from flash, through two slots
+  CHECK(bench.map.statistics().pairs_registered == expected.size());
+  CHECK(bench.map.statistics().fetches_failed == 0);
+  CHECK(bench.edges(EdgeKind::loop) == 0);
+  for (const PairEvent& event : bench.events) {
+    if (event.stage == PairEvent::Stage::registered) {
+      CHECK_FALSE(event.accepted);
+      CHECK(event.reason == LinkReason::weak);
+    }
+  }
+}
+
+TEST_CASE("loops that the matchers find become edges and mend the poses") {
+  posix::RamFlash flash({4096, 256, 256});
+  Bench bench(flash.flash());
+  bench.digests.agreement = [](std::uint32_t, std::uint32_t) { return 0.9F; };
+  bench.session(1);
+  const Pose2 start = true_pose(0);
+  for (std::uint32_t i = 0; i < 16; ++i) {
+    bench.insert(10 * i, {0.03 * i, -0.02 * i, 0.004 * i});  // odometry that drifts
+  }
+  CHECK(bench.edges(EdgeKind::loop) > 5);
+  CHECK(bench.map.statistics().pairs_accepted == bench.edges(EdgeKind::loop));
+  CHECK(bench.map.statistics().optimisations > 0);
+  const auto off = [&](SubmapId id, const Pose2& pose) {
+    return translation(between(between(start, true_pose(id)), between(bench.map.map_T_submap(0), pose)));
+  };
+  const double before = off(15, bench.map.header(15).session_T_submap);
+  const double after = off(15, bench.map.map_T_submap(15));
+  CHECK(before > 0.3);
+  CHECK(after < 0.35 * before);
+  // Switched off, no pair is looked at.
+  CollectionConfig off_config;
+  off_config.close_loops = false;
+  posix::RamFlash other({4096, 256, 256});
+  Bench none(other.flash(), off_config);
+  none.session(1);
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    none.insert(40 * i);
+  }
+  CHECK(none.digests.compared.empty());
+  CHECK(none.map.statistics().stored == 8);
+}
+
+TEST_CASE("without flash only what is still in RAM can be registered, the rest is counted") {
+  Bench bench({}, {}, 3);
+  bench.digests.agreement = [](std::uint32_t, std::uint32_t) { return 0.9F; };
+  bench.grids.agreement = [](std::uint32_t, std::uint32_t) { return 0.0F; };
+  bench.session(1);
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    bench.insert(40 * i);
+  }
+  // Of the b submaps before submap b, four at most are candidates.
+  CHECK(bench.map.statistics().fetches_failed > 0);
+  CHECK(!bench.grids.registered.empty());
+  CHECK(bench.grids.registered.size() + bench.map.statistics().fetches_failed == 1 + 2 + 3 + 4 * 4);
+}
+
+TEST_CASE("a restart finds submaps, digests, sessions and edges again, also after a crash without a flush") {
+  posix::RamFlash flash({4096, 256, 256});
+  std::vector<std::uint8_t> digests;
+  std::vector<Pose2> poses;
+  {
+    Bench first(flash.flash());
+    first.digests.agreement = [](std::uint32_t, std::uint32_t) { return 0.9F; };
+    first.session(7);
+    for (std::uint32_t i = 0; i < 10; ++i) {
+      first.insert(10 * i);
+    }
+    // Loop edges lie between the odometry edges now, and are not in the store: the power goes.
+    REQUIRE(first.edges(EdgeKind::loop) > 0);
+    digests = first.digests.digests;
+  }
+  {
+    Bench second(flash.flash());
+    REQUIRE(second.map.size() == 10);
+    CHECK(second.digests.restored == 10);
+    CHECK(second.digests.digests == digests);
+    CHECK(second.map.graph().component_count() == 1);
+    CHECK(second.edges(EdgeKind::odometry) == 9);
+    CHECK(second.map.session_count() == 1);
+    CHECK(second.map.session(0).bytes[0] == 7);
+    CHECK(second.map.newest_of_session() == kNoSubmap);
+    CHECK(second.digests.compared.empty());
+    second.session(8);
+    for (std::uint32_t i = 0; i < 5; ++i) {
+      second.insert(10 * i);
+    }
+    CHECK(second.map.graph().component_count() == 2);
+  }  // and again
+  {
+    Bench third(flash.flash());
+    REQUIRE(third.map.size() == 15);
+    CHECK(third.map.session_count() == 2);
+    CHECK(third.edges(EdgeKind::odometry) == 9 + 4);  // none was overwritten by another
+    CHECK(third.map.graph().component_count() == 2);
+    CHECK(third.map.component(9) == 0);
+    CHECK(third.map.component(14) == 10);
+    third.digests.agreement = [](std::uint32_t, std::uint32_t) { return 0.9F; };
+    third.session(9);
+    for (std::uint32_t i = 0; i < 6; ++i) {
+      third.insert(40 * i);
+    }
+    REQUIRE(third.edges(EdgeKind::merge) > 0);
+    third.map.begin_flush();
+    third.drain();
+    for (SubmapId id = 0; id < third.map.size(); ++id) {
+      poses.push_back(third.map.map_T_submap(id));
+    }
+    // All edges came back, in whatever order.
+    Bench fourth(flash.flash());
+    REQUIRE(fourth.map.size() == 21);
+    for (const EdgeKind kind : {EdgeKind::odometry, EdgeKind::loop, EdgeKind::merge}) {
+      CHECK(fourth.edges(kind) == third.edges(kind));
+    }
+    CHECK(fourth.map.graph().component_count() == third.map.graph().component_count());
+    for (SubmapId id = 0; id < 21; ++id) {
+      CHECK(fourth.map.map_T_submap(id).x == poses[id].x);
+      CHECK(fourth.map.map_T_submap(id).y == poses[id].y);
+      CHECK(fourth.map.map_T_submap(id).theta == poses[id].theta);
+    }
+  }
+}
+
+TEST_CASE("a full flash loses what does not fit, says so, and the map goes on in RAM") {
+  posix::RamFlash flash({4096, 10, 256});
+  Bench bench(flash.flash());
+  bench.session(1);
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    bench.insert(10 * i);
+  }
+  CHECK(bench.map.size() == 40);
+  CHECK(bench.map.statistics().stored > 0);
+  CHECK(bench.map.statistics().not_stored > 0);
+  CHECK(bench.map.statistics().stored + bench.map.statistics().not_stored == 40);
+  Bench again(flash.flash());
+  CHECK(again.map.size() == bench.map.statistics().stored);
+  // Full, busy, and without a session.
+  Result<SlotHandle> slot = bench.store->store.slots().acquire_free();
+  REQUIRE(slot.ok());
+  CHECK(bench.map.insert({}, slot.value(), {}).status() == Status::full);
+  CHECK_FALSE(slot.value().empty());  // still the caller's
+}

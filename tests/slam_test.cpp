@@ -1,0 +1,492 @@
+// The facade: memory, configuration, sessions, and what hostile or broken input does to it (nothing).
+#include "mellin/slam.hpp"
+
+#include <doctest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "host/heap_counter.hpp"
+#include "posix/flash_image.hpp"
+#include "tests/store_fixture.hpp"
+#include "tests/support/room.hpp"
+
+using namespace mellin;
+using mellin::test::measure;
+using mellin::test::room;
+using mellin::test::span;
+
+namespace {
+
+constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
+constexpr std::size_t kGuard = 4096;
+constexpr auto kGuardByte = std::byte{0xA5};
+
+Config with_laser(Config config, std::uint16_t beams = 180) {
+  config.lasers[0].beams = beams;
+  config.lasers[0].angle_increment_rad = static_cast<float>(kPi) / static_cast<float>(beams);
+  config.lasers[0].max_range_m = 20.0F;
+  return config;
+}
+
+/// A small configuration, quick to make and to run.
+Config small() {
+  Config config = with_laser(nano_profile(), 90);
+  config.cell_m = 0.1F;
+  config.submaps.every_scans = 4;
+  return config;
+}
+
+/// Memory with guard bytes round it.
+class GuardedMemory {
+ public:
+  explicit GuardedMemory(std::size_t size) : size_(size), words_((size + 2 * kGuard) / 8 + 1) {
+    for (std::size_t i = 0; i < words_.size() * 8; ++i) {
+      start()[i] = kGuardByte;
+    }
+  }
+  Span<std::byte> span() { return {start() + kGuard, size_}; }
+  bool intact() {
+    for (std::size_t i = 0; i < kGuard; ++i) {
+      if (start()[i] != kGuardByte || start()[kGuard + size_ + i] != kGuardByte) {
+        return false;
+      }
+    }
+    return true;
+  }
+
+ private:
+  std::byte* start() { return reinterpret_cast<std::byte*>(words_.data()); }
+  std::size_t size_;
+  std::vector<std::uint64_t> words_;
+};
+
+mellin_log sink_to(std::vector<std::string>& lines) {
+  return {&lines, [](void* context, mellin_log_level, const char* line) {
+            static_cast<std::vector<std::string>*>(context)->emplace_back(line);
+          }};
+}
+
+/// A robot that circles in the room, with perfect odometry.
+Pose2 on_circle(int step) {
+  const double angle = 0.15 * step;
+  return {2.0 * std::cos(angle) - 1.0, 1.5 * std::sin(angle), angle + kHalfPi};
+}
+
+Result<ScanOutcome> add_at(Slam& slam, const Pose2& pose, std::int64_t stamp_us = 0) {
+  const std::vector<float> ranges = measure(room(), pose, slam.config().lasers[0]);
+  return slam.add({stamp_us, span(ranges), pose, 0});
+}
+
+void drain(Slam& slam) {
+  while (slam.work(64)) {
+  }
+}
+
+void circle(Slam& slam, int from, int to) {
+  for (int i = from; i < to; ++i) {
+    REQUIRE(add_at(slam, on_circle(i), i * 100000).ok());
+    drain(slam);
+  }
+}
+
+/// A system with its memory; no flash unless it is given.
+struct Machine {
+  GuardedMemory memory;
+  Slam* slam = nullptr;
+  Status status = Status::ok;
+
+  explicit Machine(const Config& config, const mellin_port& port = {}) : memory(required_bytes(config)) {
+    Result<Slam*> made = Slam::create(config, memory.span(), port);
+    status = made.status();
+    slam = made.ok() ? made.value() : nullptr;
+  }
+  Slam& operator*() { return *slam; }
+  Slam* operator->() { return slam; }
+};
+
+std::vector<Config> configs() {
+  std::vector<Config> all{with_laser(micro_profile()), with_laser(nano_profile()), with_laser(desktop_profile())};
+  Random random(11, 1);
+  const auto pick = [&](auto... values) {
+    const int options[] = {values...};
+    return options[static_cast<std::size_t>(random.uniform() * sizeof...(values))];
+  };
+  for (int i = 0; i < 10; ++i) {
+    Config c = with_laser(micro_profile(), static_cast<std::uint16_t>(pick(1, 31, 180, 361)));
+    c.side = static_cast<std::uint16_t>(pick(128, 192, 256, 384));
+    c.screening_side = static_cast<std::uint16_t>(c.side / pick(2, 4));
+    c.registration_side = static_cast<std::uint16_t>(c.side / pick(1, 2));
+    c.class_side = static_cast<std::uint16_t>(c.side / pick(1, 2, 4));
+    c.max_submaps = static_cast<std::uint32_t>(pick(2, 7, 33));
+    c.max_sessions = static_cast<std::uint16_t>(pick(1, 3));
+    c.grid_slots = static_cast<std::uint16_t>(pick(2, 3, 5));
+    c.remembered_scans = static_cast<std::uint16_t>(pick(2, 7, 40));
+    c.mapper.particles = static_cast<std::uint16_t>(pick(1, 2, 5));
+    c.mapper.spare_scans = static_cast<std::uint16_t>(pick(1, 3, 12));
+    c.mapper.matcher.search_points = static_cast<std::uint16_t>(pick(1, 13, 72));
+    c.submaps.every_scans = 3;
+    c.submaps.band_rows = static_cast<std::uint16_t>(pick(1, 7, 32, 500));
+    c.screening.cache_features = pick(0, 1) == 1;
+    c.registration.alignment.max_points = static_cast<std::uint16_t>(pick(64, 333, 1024));
+    c.collection.linker.pending = static_cast<std::uint16_t>(pick(1, 5, 64));
+    all.push_back(c);
+  }
+  return all;
+}
+
+}  // namespace
+
+TEST_CASE("create() uses exactly required_bytes(): enough in it, one byte less refused, nothing outside touched") {
+  std::size_t index = 0;
+  for (const Config& config : configs()) {
+    CAPTURE(index++);
+    const std::size_t bytes = required_bytes(config);
+    posix::RamFlash flash({4096, 512, 256});
+    std::vector<std::string> lines;
+    mellin_port port = {};
+    port.flash = flash.flash();
+    port.log = sink_to(lines);
+    {
+      GuardedMemory memory(bytes - 1);
+      CHECK(Slam::create(config, memory.span(), port).status() == Status::insufficient_memory);
+      REQUIRE(!lines.empty());
+      CHECK(lines.back().find("lacks 1 byte") != std::string::npos);
+      CHECK(memory.intact());
+    }
+    Machine machine(config, port);
+    REQUIRE(machine.status == Status::ok);
+    CHECK(machine->arena_use().total() == bytes);
+    std::size_t sum = 0;
+    for (const std::size_t part : machine->arena_use().by_part) {
+      sum += part;
+    }
+    CHECK(sum == bytes);
+    circle(*machine, 0, 30);
+    REQUIRE(machine->begin_flush() == Status::ok);
+    drain(*machine);
+    CHECK(machine->collection().size() > 0);
+    CHECK(machine.memory.intact());
+  }
+}
+
+TEST_CASE("memory may be two regions, a fast one and a bulk one, and the results are the same") {
+  const Config config = small();
+  const ArenaUse use = required_memory(config);
+  REQUIRE(use.fast > 0);
+  CHECK(use.fast + use.bulk == required_bytes(config));
+  GuardedMemory bulk(use.bulk);
+  GuardedMemory fast(use.fast);
+  Result<Slam*> split = Slam::create(config, bulk.span(), {}, fast.span());
+  REQUIRE(split.ok());
+  Machine whole(config);
+  REQUIRE(whole.status == Status::ok);
+  circle(*split.value(), 0, 40);
+  circle(*whole, 0, 40);
+  CHECK(split.value()->pose().x == whole->pose().x);
+  CHECK(split.value()->collection().size() == whole->collection().size());
+  CHECK(bulk.intact());
+  CHECK(fast.intact());
+  GuardedMemory too_small(use.fast - 1);
+  CHECK(Slam::create(config, bulk.span(), {}, too_small.span()).status() == Status::insufficient_memory);
+  GuardedMemory less_bulk(use.bulk - 1);
+  CHECK(Slam::create(config, less_bulk.span(), {}, fast.span()).status() == Status::insufficient_memory);
+}
+
+TEST_CASE("memory that is not aligned is refused") {
+  const Config config = small();
+  GuardedMemory memory(required_bytes(config) + 8);
+  CHECK(Slam::create(config, memory.span().subspan(4, required_bytes(config)), {}).status() ==
+        Status::invalid_argument);
+}
+
+TEST_CASE("validate() refuses each field out of its range and names it") {
+  struct Bad {
+    const char* field;
+    std::function<void(Config&)> spoil;
+  };
+  const Bad all[] = {
+      {"lasers", [](Config& c) { c.lasers[0].beams = 0; }},
+      {"beams", [](Config& c) { c.lasers[0].beams = 4097; }},
+      {"min_range_m", [](Config& c) { c.lasers[0].min_range_m = -0.1F; }},
+      {"min_range_m", [](Config& c) { c.lasers[0].min_range_m = kNaN; }},
+      {"max_range_m", [](Config& c) { c.lasers[0].max_range_m = 0.01F; }},
+      {"max_range_m", [](Config& c) { c.lasers[0].max_range_m = 132.0F; }},
+      {"max_range_m", [](Config& c) { c.lasers[0].max_range_m = kNaN; }},
+      {"angle_increment_rad", [](Config& c) { c.lasers[0].angle_increment_rad = 0.1F; }},
+      {"angle_increment_rad", [](Config& c) { c.lasers[0].angle_increment_rad = kNaN; }},
+      {"angle_min_rad", [](Config& c) { c.lasers[0].angle_min_rad = INFINITY; }},
+      {"base_T_laser", [](Config& c) { c.lasers[0].base_T_laser.x = NAN; }},
+      {"base_T_laser", [](Config& c) { c.lasers[0].base_T_laser.y = -1e9; }},
+      {"cell_m", [](Config& c) { c.cell_m = 0.0F; }},
+      {"cell_m", [](Config& c) { c.cell_m = kNaN; }},
+      {"side", [](Config& c) { c.side = 32; }},
+      {"side", [](Config& c) { c.side = 200; }},
+      {"side", [](Config& c) { c.side = 4096; }},
+      {"remembered_scans", [](Config& c) { c.remembered_scans = 1; }},
+      {"remembered_scans x beams", [](Config& c) { c.remembered_scans = 400; }},
+      {"particles", [](Config& c) { c.mapper.particles = 0; }},
+      {"spare_scans", [](Config& c) { c.mapper.spare_scans = 0; }},
+      {"spare_scans", [](Config& c) { c.mapper.spare_scans = 65530; }},
+      {"take_distance_m", [](Config& c) { c.mapper.take_distance_m = 0.0F; }},
+      {"take_angle_rad", [](Config& c) { c.mapper.take_angle_rad = kNaN; }},
+      {"resample_share", [](Config& c) { c.mapper.resample_share = kNaN; }},
+      {"proposal_spread", [](Config& c) { c.mapper.proposal_spread = -1.0F; }},
+      {"point_sigma_m", [](Config& c) { c.mapper.matcher.point_sigma_m = 0.0F; }},
+      {"independent_share", [](Config& c) { c.mapper.matcher.independent_share = kNaN; }},
+      {"distance_base_m", [](Config& c) { c.mapper.noise.distance_base_m = 0.0F; }},
+      {"distance_per_m", [](Config& c) { c.mapper.noise.distance_per_m = kNaN; }},
+      {"distance_per_rad", [](Config& c) { c.mapper.noise.distance_per_rad = -0.1F; }},
+      {"angle_base_rad", [](Config& c) { c.mapper.noise.angle_base_rad = 0.0F; }},
+      {"angle_per_m", [](Config& c) { c.mapper.noise.angle_per_m = INFINITY; }},
+      {"angle_per_rad", [](Config& c) { c.mapper.noise.angle_per_rad = kNaN; }},
+      {"search_points", [](Config& c) { c.mapper.matcher.search_points = 0; }},
+      {"search_distance_m", [](Config& c) { c.mapper.matcher.search_distance_m = kNaN; }},
+      {"search_distance_m", [](Config& c) { c.mapper.matcher.search_distance_m = 1e9F; }},
+      {"search_angle_rad", [](Config& c) { c.mapper.matcher.search_angle_rad = 7.0F; }},
+      {"search_angle_step_rad", [](Config& c) { c.mapper.matcher.search_angle_step_rad = 0.0F; }},
+      {"scan_weight", [](Config& c) { c.mapper.matcher.scan_weight = kNaN; }},
+      {"min_inlier_share", [](Config& c) { c.mapper.matcher.min_inlier_share = kNaN; }},
+      {"every_scans", [](Config& c) { c.submaps.every_scans = 0; }},
+      {"band_rows", [](Config& c) { c.submaps.band_rows = 0; }},
+      {"max_path_m", [](Config& c) { c.submaps.max_path_m = kNaN; }},
+      {"every_path_m", [](Config& c) { c.submaps.every_path_m = 0.0F; }},
+      {"max_drift_m", [](Config& c) { c.submaps.max_drift_m = kNaN; }},
+      {"max_drift_rad", [](Config& c) { c.submaps.max_drift_rad = -1.0F; }},
+      {"drift_share", [](Config& c) { c.submaps.drift_share = kNaN; }},
+      {"screening_side", [](Config& c) { c.screening_side = 50; }},
+      {"registration_side", [](Config& c) { c.registration_side = 0; }},
+      {"class_side", [](Config& c) { c.class_side = 100; }},
+      {"class_side", [](Config& c) { c.class_side = 0; }},
+      {"grid_slots", [](Config& c) { c.grid_slots = 1; }},
+      {"max_submaps", [](Config& c) { c.max_submaps = 1; }},
+      {"max_submaps", [](Config& c) { c.max_submaps = 70000; }},
+      {"max_sessions", [](Config& c) { c.max_sessions = 0; }},
+      {"pending", [](Config& c) { c.collection.linker.pending = 65; }},
+      {"base_m", [](Config& c) { c.collection.odometry.base_m = 0.0F; }},
+      {"base_rad", [](Config& c) { c.collection.odometry.base_rad = kNaN; }},
+  };
+  std::vector<std::string> lines;
+  const mellin_log sink = sink_to(lines);
+  CHECK(validate(with_laser(micro_profile()), Log(sink)) == Status::ok);
+  CHECK(validate(with_laser(nano_profile()), Log(sink)) == Status::ok);
+  CHECK(validate(with_laser(desktop_profile()), Log(sink)) == Status::ok);
+  CHECK(lines.empty());
+  for (const Bad& bad : all) {
+    CAPTURE(bad.field);
+    lines.clear();
+    Config config = with_laser(micro_profile());
+    bad.spoil(config);
+    CHECK(validate(config, Log(sink)) == Status::invalid_config);
+    REQUIRE(lines.size() == 1);
+    CHECK(lines[0].find(std::string(bad.field) + " is") != std::string::npos);
+    std::vector<std::uint64_t> one(1);
+    CHECK(Slam::create(config, {reinterpret_cast<std::byte*>(one.data()), 8}, {}).status() == Status::invalid_config);
+  }
+}
+
+TEST_CASE("without flash the map still grows, and submaps that left RAM are missed, not invented") {
+  Machine machine(small());
+  REQUIRE(machine.status == Status::ok);
+  circle(*machine, 0, 120);
+  CHECK(machine->collection().size() > machine->store().slots().capacity());
+  CHECK_FALSE(machine->store().keeps_data());
+  CHECK(machine->store().begin_fetch(0) == Status::not_found);
+  CHECK(translation(between(machine->pose(), between(on_circle(0), on_circle(119)))) < 0.1);
+  CHECK(machine->begin_flush() == Status::ok);
+  drain(*machine);
+  CHECK_FALSE(machine->work());
+}
+
+TEST_CASE("sessions: each starts where it is told, in a component of its own, and their number is bounded") {
+  Config config = small();
+  config.max_sessions = 3;
+  config.collection.close_loops = false;
+  Machine machine(config);
+  REQUIRE(machine.status == Status::ok);
+  CHECK_FALSE(machine->map_pose().linked);
+  circle(*machine, 0, 40);
+  REQUIRE(machine->begin_flush() == Status::ok);
+  CHECK(machine->new_session() == Status::busy);
+  drain(*machine);
+  const SubmapId first_size = machine->collection().size();
+  REQUIRE(first_size > 0);
+  CHECK(machine->map_pose().linked);
+  CHECK(machine->map_pose().component == 0);
+  REQUIRE(machine->set_pose({3.0, -2.0, 1.0}) == Status::ok);
+  CHECK(machine->pose().x == 3.0);
+  CHECK(machine->pose().theta == 1.0);
+  CHECK_FALSE(machine->map_pose().linked);
+  CHECK(machine->mapper().scans().end() == 0);
+  circle(*machine, 0, 40);
+  REQUIRE(machine->begin_flush() == Status::ok);
+  drain(*machine);
+  // A rigid motion of the room: the first scan lies where the session was told to start.
+  const Pose2 moved = compose({3.0, -2.0, 1.0}, between(on_circle(0), on_circle(39)));
+  CHECK(translation(between(machine->pose(), moved)) < 0.1);
+  CHECK(machine->map_pose().component == first_size);
+  CHECK(machine->collection().graph().component_count() == 2);
+  REQUIRE(machine->new_session() == Status::ok);
+  CHECK(machine->new_session() == Status::full);
+  for (const double bad : {static_cast<double>(NAN), static_cast<double>(INFINITY), 1e300, -1e9}) {
+    CHECK(machine->new_session({bad, 0.0, 0.0}) == Status::invalid_argument);
+    CHECK(machine->new_session({0.0, 0.0, bad}) == Status::invalid_argument);
+  }
+}
+
+TEST_CASE("bad scans are refused or ridden out, and the map keeps going") {
+  Machine machine(small());
+  REQUIRE(machine.status == Status::ok);
+  Slam& slam = *machine;
+  circle(slam, 0, 20);
+  const Pose2 before = slam.pose();
+  const std::vector<float> good = measure(room(), on_circle(20), slam.config().lasers[0]);
+  const auto refused = [&](const Scan& scan) {
+    CHECK(slam.add(scan).status() == Status::bad_data);
+    CHECK(slam.pose().x == before.x);
+    CHECK(slam.pose().theta == before.theta);
+  };
+  refused({0, span(good).first(89), on_circle(20), 0});
+  refused({0, Span<const float>(), on_circle(20), 0});
+  refused({0, span(good), on_circle(20), 1});
+  refused({0, span(good), on_circle(20), 200});
+  for (const double bad : {static_cast<double>(NAN), static_cast<double>(INFINITY), 1e300}) {
+    refused({0, span(good), {bad, 0.0, 0.0}, 0});
+    refused({0, span(good), {0.0, bad, 0.0}, 0});
+    refused({0, span(good), {0.0, 0.0, bad}, 0});
+  }
+  CHECK(slam.mapper().statistics().refused == 13);
+
+  const auto truth = [&](int step) { return between(on_circle(0), on_circle(step)); };
+  // Blind for a few steps: it rides on odometry, which is exact here.
+  const std::vector<float> blind(90, kNaN);
+  for (int i = 20; i < 26; ++i) {
+    const Result<ScanOutcome> outcome = slam.add({0, span(blind), on_circle(i), 0});
+    REQUIRE(outcome.ok());
+    CHECK(outcome.value().use == ScanUse::odometry);
+  }
+  const Pose2 ridden = compose(before, between(on_circle(19), on_circle(25)));
+  CHECK(translation(between(slam.pose(), ridden)) < 1e-9);
+  // Ranges of all kinds of nonsense are beams that measured nothing; the clock may jump.
+  std::vector<float> nonsense = good;
+  for (std::size_t i = 0; i < nonsense.size(); i += 4) {
+    const float values[] = {kNaN, INFINITY, -INFINITY, -3.0F, 1e30F, 0.0F};
+    nonsense[i] = values[i / 4 % 6];
+  }
+  CHECK(slam.add({INT64_MIN, span(nonsense), on_circle(20), 0}).ok());
+  CHECK(slam.add({INT64_MAX, span(good), on_circle(20), 0}).ok());
+  drain(slam);
+  circle(slam, 21, 60);
+  CHECK(translation(between(slam.pose(), truth(59))) < 0.1);
+
+  // Odometry that jumps far away, and on and on: accepted or refused, never beyond what the grid can count.
+  for (int i = 0; i < 4000; ++i) {
+    const double side = i % 2 == 0 ? 9e5 : -9e5;
+    (void)slam.add({0, span(good), {side, side, i % 2 == 0 ? 0.0 : kPi}, 0}).ok();
+    CHECK(std::fabs(slam.pose().x) < 1e7);
+    CHECK(std::fabs(slam.pose().y) < 1e7);
+  }
+  drain(slam);
+  REQUIRE(slam.begin_flush() == Status::ok);
+  drain(slam);
+  REQUIRE(slam.new_session() == Status::ok);
+  circle(slam, 0, 30);
+  CHECK(translation(between(slam.pose(), truth(29))) < 0.1);
+  CHECK(machine.memory.intact());
+}
+
+TEST_CASE("when nobody calls work() the live map goes on, and submaps are delayed, not broken") {
+  Machine machine(small());
+  REQUIRE(machine.status == Status::ok);
+  for (int i = 0; i < 250; ++i) {
+    REQUIRE(add_at(*machine, on_circle(i)).ok());
+  }
+  CHECK(machine->statistics().submaps_delayed > 0);
+  CHECK(translation(between(machine->pose(), between(on_circle(0), on_circle(249)))) < 0.1);
+  drain(*machine);  // the one that was frozen has lost its scans meanwhile
+  CHECK(machine->statistics().submaps_lost == 1);
+  CHECK(machine->collection().size() == 0);
+  circle(*machine, 250, 300);
+  CHECK(machine->collection().size() > 0);
+}
+
+TEST_CASE("a full collection loses submaps, counts them, and keeps the robot localised") {
+  Config config = small();
+  config.max_submaps = 3;
+  Machine machine(config);
+  REQUIRE(machine.status == Status::ok);
+  circle(*machine, 0, 120);
+  CHECK(machine->collection().size() == 3);
+  CHECK(machine->statistics().submaps_lost > 0);
+  CHECK(translation(between(machine->pose(), between(on_circle(0), on_circle(119)))) < 0.1);
+}
+
+TEST_CASE("the power may go at any moment: what was reported as stored is there after the restart") {
+  const Config config = small();
+  std::uint32_t with_submaps = 0;
+  for (std::uint64_t cut = 0; cut < 400; cut += cut < 12 ? 1 : 29) {
+    CAPTURE(cut);
+    test::TornFlash flash({4096, 64, 256});
+    mellin_port port = {};
+    port.flash = flash.flash();
+    flash.cut_after(cut, static_cast<std::uint32_t>(cut), cut % 2 == 1);
+    std::uint32_t stored = 0;
+    {
+      Machine before(config, port);
+      if (before.status == Status::ok) {
+        circle(*before, 0, 160);
+        REQUIRE(before->begin_flush() == Status::ok);
+        drain(*before);
+        stored = before->collection().statistics().stored;
+      } else {
+        CHECK(before.status == Status::device_error);
+      }
+    }
+    flash.restore();
+    Machine after(config, port);
+    REQUIRE(after.status == Status::ok);
+    CHECK(after->collection().size() >= stored);
+    CHECK(after->collection().size() <= stored + 1);  // the commit itself may have been cut
+    for (SubmapId id = 0; id < after->collection().size(); ++id) {
+      CHECK(after->store().grid_crc32(id).ok());
+    }
+    with_submaps += stored > 0 ? 1U : 0U;
+    const std::uint32_t found = after->collection().size();
+    circle(*after, 0, 100);
+    CHECK(after->collection().size() > found);
+    CHECK(flash.violations() == 0);
+  }
+  CHECK(with_submaps > 3);
+}
+
+TEST_CASE("library calls leave the heap alone") {
+  if (!host::heap_is_counted()) {
+    MESSAGE("not counted under sanitizers");
+    return;
+  }
+  const Config config = small();
+  posix::RamFlash flash({4096, 512, 256});
+  mellin_port port = {};
+  port.flash = flash.flash();
+  GuardedMemory memory(required_bytes(config));
+  std::vector<std::vector<float>> scans;
+  for (int i = 0; i < 60; ++i) {
+    scans.push_back(measure(room(), on_circle(i), config.lasers[0]));
+  }
+  host::reset_heap_counts();
+  {
+    const host::LibraryCall inside;
+    Result<Slam*> made = Slam::create(config, memory.span(), port);
+    REQUIRE(made.ok());
+    for (int i = 0; i < 60; ++i) {
+      (void)made.value()->add({0, span(scans[static_cast<std::size_t>(i)]), on_circle(i), 0}).ok();
+      drain(*made.value());
+    }
+    (void)made.value()->begin_flush();
+    drain(*made.value());
+  }
+  CHECK(host::heap_counts().allocations == 0);
+}
