@@ -424,7 +424,7 @@ TEST_CASE("a full collection loses submaps, counts them, and keeps the robot loc
   CHECK(translation(between(machine->pose(), between(on_circle(0), on_circle(119)))) < 0.1);
 }
 
-TEST_CASE("the power may go at any moment: what was reported as stored is there after the restart") {
+TEST_CASE("the power may go at any moment of a run: what was reported as stored is there after the restart") {
   const Config config = small();
   std::uint32_t with_submaps = 0;
   for (std::uint64_t cut = 0; cut < 400; cut += cut < 12 ? 1 : 29) {
@@ -432,18 +432,15 @@ TEST_CASE("the power may go at any moment: what was reported as stored is there 
     test::TornFlash flash({4096, 64, 256});
     mellin_port port = {};
     port.flash = flash.flash();
-    flash.cut_after(cut, static_cast<std::uint32_t>(cut), cut % 2 == 1);
     std::uint32_t stored = 0;
     {
       Machine before(config, port);
-      if (before.status == Status::ok) {
-        circle(*before, 0, 160);
-        REQUIRE(before->begin_flush() == Status::ok);
-        drain(*before);
-        stored = before->collection().statistics().stored;
-      } else {
-        CHECK(before.status == Status::device_error);
-      }
+      REQUIRE(before.status == Status::ok);
+      flash.cut_after(cut, static_cast<std::uint32_t>(cut), cut % 2 == 1);
+      circle(*before, 0, 160);  // the map goes on without its flash
+      REQUIRE(before->begin_flush() == Status::ok);
+      drain(*before);
+      stored = before->collection().statistics().stored;
     }
     flash.restore();
     Machine after(config, port);
