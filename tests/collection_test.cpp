@@ -82,11 +82,14 @@ class FakeGrids final : public GridMatcher {
   std::function<float(std::uint32_t, std::uint32_t)> agreement = [](std::uint32_t, std::uint32_t) { return 0.9F; };
   std::vector<Pair> registered;
 
-  Status begin(const GridView& a, const GridView& b) override {
-    registered.emplace_back(a.cells[0], b.cells[0]);
+  Status set_query(const GridView& b) override {
+    query_ = b.cells[0];
+    return Status::ok;
+  }
+  Status begin(const GridView& a) override {
+    registered.emplace_back(a.cells[0], query_);
     hypotheses_.clear();
-    (void)hypotheses_.push(
-        place(between(true_pose(a.cells[0]), true_pose(b.cells[0])), agreement(a.cells[0], b.cells[0])));
+    (void)hypotheses_.push(place(between(true_pose(a.cells[0]), true_pose(query_)), agreement(a.cells[0], query_)));
     steps_ = 2;
     return Status::ok;
   }
@@ -94,6 +97,7 @@ class FakeGrids final : public GridMatcher {
   const PlaceHypotheses& hypotheses() const override { return hypotheses_; }
 
  private:
+  std::uint8_t query_ = 0;
   int steps_ = 0;
   PlaceHypotheses hypotheses_;
 };

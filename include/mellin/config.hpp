@@ -92,7 +92,7 @@ constexpr StoreConfig store_config(const Config& c) {
   return store;
 }
 
-/// The paper's sizes: 768 x 768 cells of 5 cm, 40 scans.
+/// The paper's sizes: 768 x 768 cells of 5 cm, 40 scans; but one particle, see ParticleMapperConfig.
 constexpr Config desktop_profile() {
   Config c;
   c.max_submaps = 1024;
@@ -102,7 +102,7 @@ constexpr Config desktop_profile() {
   return c;
 }
 
-/// For a board with a few megabytes of RAM (Cortex-M7, M55): 384 x 384 cells of 10 cm, one particle.
+/// For a board with a few megabytes of RAM (Cortex-M7, M55): 384 x 384 cells of 10 cm.
 constexpr Config micro_profile() {
   Config c;
   c.side = 384;
@@ -112,7 +112,6 @@ constexpr Config micro_profile() {
   c.class_side = 192;
   c.max_submaps = 144;
   c.grid_slots = 2;
-  c.mapper.particles = 1;
   c.mapper.spare_scans = 8;
   c.submaps.band_rows = 16;
   c.screening.cache_features = false;
@@ -124,7 +123,7 @@ constexpr Config micro_profile() {
   return c;
 }
 
-/// For a board with a few hundred kilobytes (Cortex-M4F, M33): 192 x 192 cells of 20 cm, one particle.
+/// For a board with a few hundred kilobytes (Cortex-M4F, M33): 192 x 192 cells of 20 cm.
 constexpr Config nano_profile() {
   Config c = micro_profile();
   c.side = 192;

@@ -1,9 +1,9 @@
 // A simulated office floor, a robot that drives through it, its laser and its bad odometry: logs with exact truth.
 //
-// The floor is a ring corridor round a core. Four wide bends join four straight stretches with rooms, doors and furniture
-// on both sides. One bend or more have smooth, bare walls. In such a bend a laser cannot tell how far along the robot is (an annulus looks
-// the same everywhere), and moving along it turns the robot, so that the odometry's scale error becomes an error of
-// heading there that no scan matcher corrects: only recognising a place does.
+// The floor is a ring corridor round a core. Four wide bends join four straight stretches with rooms, doors and
+// furniture on both sides. One bend or more have smooth, bare walls. In such a bend a laser cannot tell how far along
+// the robot is (an annulus looks the same everywhere), and moving along it turns the robot, so that the odometry's
+// scale error becomes an error of heading there that no scan matcher corrects: only recognising a place does.
 //
 // The same options give the same bytes on every machine (mellin::Random, mellin::sincos, no libm).
 #pragma once

@@ -33,7 +33,7 @@ struct LinkerConfig {
   float min_overlap = 0.1F;
   /// A match that leaves the pose less determined than this along any direction is none: in a plain corridor or bend
   /// two submaps fit at any offset, and the one that was found says nothing.
-  float max_sigma_m = 0.25F;
+  float max_sigma_m = 0.15F;
   float max_sigma_rad = 0.05F;
   /// What registration does not know of: submaps are not quite rigid. Added to its covariance.
   float warp_sigma_m = 0.04F;

@@ -20,10 +20,10 @@ namespace mellin {
 
 /// Deviations of an odometry edge between consecutive submaps, beside the drift that the local mapper knows of.
 struct OdometryEdgeNoise {
-  float base_m = 0.03F;
-  float per_m = 0.01F;  ///< times the distance of the centres
-  float base_rad = 0.012F;
-  float per_m_rad = 0.0005F;  ///< times the distance of the centres
+  float base_m = 0.02F;
+  float per_m = 0.005F;  ///< times the distance of the centres
+  float base_rad = 0.005F;
+  float per_m_rad = 0.0F;  ///< times the distance of the centres
 };
 
 struct CollectionConfig {

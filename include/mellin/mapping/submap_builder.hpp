@@ -20,11 +20,11 @@ struct SubmapBuilderConfig {
   /// Nor may a submap hold more scans than the local mapper is sure of: those along a featureless stretch are placed by
   /// odometry, and a rigid grid that spans it would hold its error for good. Deviations from the newest scan to the
   /// oldest.
-  float max_drift_m = 0.25F;
-  float max_drift_rad = 0.03F;
+  float max_drift_m = 0.3F;
+  float max_drift_rad = 0.04F;
   std::uint16_t min_scans = 6;  ///< rendered all the same, however uncertain
   /// Share of a scan's deviation that points the same way scan after scan, since it comes from the odometry's bias.
-  float drift_share = 0.5F;
+  float drift_share = 1.0F;
   std::uint16_t side = 768;  ///< cells of the grid; even
   float cell_m = 0.05F;
   std::uint16_t band_rows = 32;  ///< rows rendered in one slice; memory in proportion
