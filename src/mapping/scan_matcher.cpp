@@ -65,6 +65,54 @@ struct ScanMatcher::Linearised {
   std::size_t inliers = 0;
 };
 
+namespace {
+
+constexpr float kNormalBase_m = 0.25F;  // to the neighbours on both sides that a normal is taken from
+constexpr float kSurfaceGap_m = 0.6F;   // between neighbouring ends that may lie on one surface
+constexpr int kNormalReach = 8;         // beams
+constexpr float kStraight = 0.15F;      // share of the chord by which its middle may be off, or it is a corner
+
+float squared_distance(const Point2f& a, const Point2f& b) {
+  return (a.x - b.x) * (a.x - b.x) + (a.y - b.y) * (a.y - b.y);
+}
+
+}  // namespace
+
+/// The first point in that direction along the surface that is far enough for a normal; the point itself where the
+/// surface ends before.
+std::size_t ScanMatcher::neighbour(std::size_t point, int direction, float cell_m) const {
+  const float base = kNormalBase_m / cell_m;
+  const float gap = kSurfaceGap_m / cell_m;
+  std::size_t at = point;
+  for (int i = 0; i < kNormalReach; ++i) {
+    const bool last = direction < 0 ? at == 0 : at + 1 >= count_;
+    const std::size_t next = direction < 0 ? at - 1 : at + 1;
+    if (last || squared_distance(memory_.points[at], memory_.points[next]) > gap * gap) {
+      return point;
+    }
+    at = next;
+    if (squared_distance(memory_.points[point], memory_.points[at]) >= base * base) {
+      return at;
+    }
+  }
+  return point;
+}
+
+/// From the neighbours on both sides, or on the one where the surface goes on.
+Point2f ScanMatcher::normal(std::size_t point, float cell_m) const {
+  const Point2f a = memory_.points[neighbour(point, -1, cell_m)];
+  const Point2f b = memory_.points[neighbour(point, 1, cell_m)];
+  const float squared = squared_distance(a, b);
+  if (squared == 0.0F) {
+    return {};
+  }
+  const Point2f q = memory_.points[point];
+  const float inverse = 1.0F / sqrt(squared);
+  const Point2f n{(b.y - a.y) * inverse, (a.x - b.x) * inverse};
+  const float off = (n.x * (q.x - a.x) + n.y * (q.y - a.y)) * inverse;
+  return off > kStraight || off < -kStraight ? Point2f{} : n;  // a corner has none
+}
+
 std::size_t ScanMatcher::set_scan(Span<const StoredRange> ranges, Span<const Point2f> directions,
                                   const Pose2& base_T_laser, float cell_m) {
   count_ = 0;
@@ -77,6 +125,9 @@ std::size_t ScanMatcher::set_scan(Span<const StoredRange> ranges, Span<const Poi
       const float length = static_cast<float>(ranges[i]) * step;
       memory_.points[count_++] = {mount_x + directions[i].x * length, mount_y + directions[i].y * length};
     }
+  }
+  for (std::size_t i = 0; i < count_; ++i) {
+    memory_.normals[i] = normal(i, cell_m);
   }
   return count_;
 }
@@ -94,7 +145,15 @@ ScanMatcher::Linearised ScanMatcher::linearise(const LiveGrid& grid, const GridP
     const Point2f q = memory_.points[i];
     const float rx = c * q.x - s * q.y;
     const float ry = s * q.x + c * q.y;
-    const Sample f = sample(grid, at.column, at.row, px + rx, py + ry);
+    Sample f = sample(grid, at.column, at.row, px + rx, py + ry);
+    const Point2f n = memory_.normals[i];
+    if (n.x != 0.0F || n.y != 0.0F) {
+      const float nx = c * n.x - s * n.y;
+      const float ny = s * n.x + c * n.y;
+      const float across = f.dx * nx + f.dy * ny;
+      f.dx = across * nx;
+      f.dy = across * ny;
+    }
     const float residual = 1.0F - f.value;
     const float ft = f.dy * rx - f.dx * ry;
     out.cost += residual * residual;
@@ -185,39 +244,6 @@ MatchResult ScanMatcher::refine(const LiveGrid& grid, const Pose2& start, const 
   result.inlier_share = static_cast<float>(here.inliers) / static_cast<float>(count_);
   result.good = result.inlier_share >= config_.min_inlier_share;
   return result;
-}
-
-namespace {
-
-constexpr float kNormalBase_m = 0.25F;  // to the neighbours on both sides that a normal is taken from
-constexpr float kSurfaceGap_m = 0.6F;   // between neighbouring ends that may lie on one surface
-constexpr int kNormalReach = 8;         // beams
-constexpr float kStraight = 0.15F;      // share of the chord by which its middle may be off, or it is a corner
-
-float squared_distance(const Point2f& a, const Point2f& b) {
-  return (a.x - b.x) * (a.x - b.x) + (a.y - b.y) * (a.y - b.y);
-}
-
-}  // namespace
-
-/// The first point in that direction along the surface that is far enough for a normal; the point itself where the
-/// surface ends before.
-std::size_t ScanMatcher::neighbour(std::size_t point, int direction, float cell_m) const {
-  const float base = kNormalBase_m / cell_m;
-  const float gap = kSurfaceGap_m / cell_m;
-  std::size_t at = point;
-  for (int i = 0; i < kNormalReach; ++i) {
-    const bool last = direction < 0 ? at == 0 : at + 1 >= count_;
-    const std::size_t next = direction < 0 ? at - 1 : at + 1;
-    if (last || squared_distance(memory_.points[at], memory_.points[next]) > gap * gap) {
-      return point;
-    }
-    at = next;
-    if (squared_distance(memory_.points[point], memory_.points[at]) >= base * base) {
-      return at;
-    }
-  }
-  return point;
 }
 
 Sym3 ScanMatcher::scan_information(const LiveGrid& grid, const Pose2& pose) const {

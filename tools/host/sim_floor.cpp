@@ -48,11 +48,11 @@ void add_pilasters(Floor& floor, int side, Random& random) {
   const double from = ring::side_start(side) + ring::side_length(side);
   for (const double wall : {-ring::kHalfWidth_m, ring::kHalfWidth_m}) {
     const double inwards = wall < 0.0 ? 1.0 : -1.0;
-    for (double way = between_limits(random, 0.5, 2.0); way < ring::kBend_m - 0.6;
-         way += between_limits(random, 1.2, 3.5)) {
+    for (double way = between_limits(random, 0.5, 2.0); way < ring::kBend_m - 1.1;
+         way += between_limits(random, 1.8, 3.5)) {
       const Pose2 frame = ring::centre_line(from + way);
-      const double width = between_limits(random, 0.2, 0.5);
-      const double top = wall + inwards * between_limits(random, 0.15, 0.3);
+      const double width = between_limits(random, 0.5, 1.0);
+      const double top = wall + inwards * between_limits(random, 0.3, 0.6);
       add_wall(floor, frame, 0.0, wall, 0.0, top);
       add_wall(floor, frame, 0.0, top, width, top);
       add_wall(floor, frame, width, top, width, wall);

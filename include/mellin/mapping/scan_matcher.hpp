@@ -47,12 +47,14 @@ class ScanMatcher {
   };
   struct Memory {
     Span<Point2f> points;
+    Span<Point2f> normals;  ///< of the surface at each point, (0, 0) where none is evident
     Span<CellOffset> offsets;
     Span<std::uint32_t> indices;  ///< where those cells lie in memory that can be reached without looking
   };
   template <class A>
   static constexpr Memory carve(A& arena, const ScanMatcherConfig& config) {
     return {arena.template take<Point2f>(config.max_points, Part::mapper, Region::fast),
+            arena.template take<Point2f>(config.max_points, Part::mapper, Region::fast),
             arena.template take<CellOffset>(config.search_points, Part::mapper, Region::fast),
             arena.template take<std::uint32_t>(config.search_points, Part::mapper, Region::fast)};
   }
@@ -65,8 +67,10 @@ class ScanMatcher {
   std::size_t set_scan(Span<const StoredRange> ranges, Span<const Point2f> directions, const Pose2& base_T_laser,
                        float cell_m);
 
-  /// Gauss-Newton from `start`. `prior` is the predicted pose, `prior_information` its information in its own frame.
-  /// Cost: max_iterations x points x 4 cells.
+  /// Gauss-Newton from `start`. A point pulls along the normal of its surface only: where a surface comes into view
+  /// from behind another, its new points would else be drawn along it to what of it is in the map, and every scan
+  /// forward. `prior` is the predicted pose, `prior_information` its information in its own frame. Cost: max_iterations
+  /// x points x 4 cells.
   MatchResult refine(const LiveGrid& grid, const Pose2& start, const Pose2& prior, const Sym3& prior_information) const;
 
   /// What the scan alone says about a pose at which it was matched, in the pose's own frame (m, m, rad): each beam that
@@ -83,6 +87,7 @@ class ScanMatcher {
   struct Linearised;
   Linearised linearise(const LiveGrid& grid, const GridPose& at, float x, float y, float theta) const;
   std::size_t neighbour(std::size_t point, int direction, float cell_m) const;
+  Point2f normal(std::size_t point, float cell_m) const;
   struct SearchPoints;
   SearchPoints place_points(const LiveGrid& grid, const GridPose& at, float theta, std::size_t stride,
                             std::int32_t reach_cells) const;
