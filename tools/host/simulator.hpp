@@ -22,9 +22,9 @@ struct SimOptions {
   int sessions = 1;             ///< logs of the same floor: each starts elsewhere, in an odometry frame of its own
   double change = 0.0;          ///< share of the furniture and the doors that is changed from each session to the next
   int bare_bends = 1;           ///< bends with smooth walls, 0 to 4; the others have pilasters
-  int loops = 4;                ///< times round the ring in a session
+  int loops = 5;                ///< times round the ring in a session
   int beams = 180;              ///< 180 (1 degree apart) or 360 (half a degree), the first at -90 degrees
-  double range_m = 8.0;         ///< reach of the laser
+  double range_m = 12.0;        ///< reach of the laser
   double spacing_m = 0.2;       ///< path between scans
   double turn_rad = 0.2;        ///< turn between scans, where the robot turns on the spot
   double range_noise_m = 0.01;  ///< deviation of a range

@@ -68,13 +68,15 @@ class LiveGrid {
 };
 
 /// How solid a cell is, in 16 steps: the share of hits among its observations, saturated at a half, since beams that
-/// graze a wall pass through its cells as often as they end there.
+/// graze a wall pass through its cells as often as they end there; and less for a cell that was hit once or twice,
+/// which may be the stray end of a beam behind the wall that no later beam reaches to take back.
 inline std::uint8_t solidity(const CellCount& cell) {
   if (cell.hits == 0) {
     return 0;
   }
-  const std::uint32_t steps = (30U * cell.hits + cell.observations / 2U) / cell.observations;
-  return static_cast<std::uint8_t>(steps > 15U ? 15U : steps);
+  const std::uint32_t trust = cell.hits < 3U ? 5U + 4U * cell.hits : 15U;
+  const std::uint32_t steps = 2U * trust * cell.hits / cell.observations;
+  return static_cast<std::uint8_t>(steps < trust ? steps : trust);
 }
 
 /// The field at a distance of (dx, dy) cells, each -2 to 2, from a cell of the given solidity.
