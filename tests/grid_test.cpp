@@ -198,7 +198,12 @@ TEST_CASE("the field falls off with the distance from a solid cell") {
   }
   CHECK(solidity({10, 0}) == 0);
   CHECK(solidity({10, 5}) == 15);
-  CHECK(solidity({10, 1}) == 3);
+  CHECK(solidity({12, 3}) == 7);  // a quarter of the beams: half of the steps
+  // Hit once or twice: 9 or 13 of the steps at most.
+  CHECK(solidity({1, 1}) == 9);
+  CHECK(solidity({2, 2}) == 13);
+  CHECK(solidity({3, 3}) == 15);
+  CHECK(solidity({10, 1}) == 1);
 }
 
 TEST_CASE("stored ranges: what is no measurement is 0, the rest is good to a millimetre") {

@@ -149,6 +149,7 @@ SubmapBuilderConfig builder_config(std::uint16_t band_rows = 32) {
   config.every_path_m = 1000.0F;
   config.side = 256;
   config.band_rows = band_rows;
+  config.drift_share = 0.5F;
   return config;
 }
 

@@ -214,12 +214,12 @@ TEST_CASE("matching recovers a known offset to millimetres and a tenth of a degr
   }
 }
 
-TEST_CASE("correlative search recovers 0.4 m and 15 degrees, where refinement alone is lost") {
+TEST_CASE("correlative search recovers 0.45 m and 19 degrees, where refinement alone is lost") {
   Bench bench(0.05F, -kPi, 360);
   bench.map(room(), views());
   int lost = 0;
   for (const Pose2& off :
-       {Pose2{0.4, -0.4, 15.0 * kDegree}, Pose2{-0.4, 0.3, -15.0 * kDegree}, Pose2{0.35, 0.4, -12.0 * kDegree}}) {
+       {Pose2{0.45, -0.45, 19.0 * kDegree}, Pose2{-0.45, 0.4, -19.0 * kDegree}, Pose2{0.45, 0.45, -18.0 * kDegree}}) {
     const Pose2 truth{0.2, 0.1, 0.8};
     (void)bench.look(room(), truth);
     const Pose2 start = compose(truth, off);
