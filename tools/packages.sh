@@ -5,9 +5,9 @@
 set -euo pipefail
 
 declare -A sets=(
-  [build]="cmake ninja-build g++ libeigen3-dev doctest-dev libcli11-dev nlohmann-json3-dev libpng-dev zlib1g-dev libfftw3-dev libbenchmark-dev"
+  [build]="cmake ninja-build g++ libeigen3-dev doctest-dev libcli11-dev nlohmann-json3-dev libpng-dev zlib1g-dev libfftw3-dev libbenchmark-dev python3"
   [source]="ca-certificates dpkg-dev xz-utils"
-  [test]="binutils clang clang-tidy clang-format python3"
+  [test]="binutils clang clang-tidy clang-format"
 )
 
 wanted=()

@@ -102,14 +102,14 @@ constexpr Config desktop_profile() {
   return c;
 }
 
-/// For a board with a few megabytes of RAM (Cortex-M7, M55): 384 x 384 cells of 10 cm.
+/// For a board with a few megabytes of RAM (Cortex-M7, M55): 320 x 320 cells of 10 cm.
 constexpr Config micro_profile() {
   Config c;
-  c.side = 384;
+  c.side = 320;
   c.cell_m = 0.1F;
-  c.screening_side = 48;
-  c.registration_side = 96;
-  c.class_side = 192;
+  c.screening_side = 40;
+  c.registration_side = 80;
+  c.class_side = 160;
   c.max_submaps = 144;
   c.grid_slots = 2;
   c.mapper.spare_scans = 8;
@@ -123,13 +123,13 @@ constexpr Config micro_profile() {
   return c;
 }
 
-/// For a board with a few hundred kilobytes (Cortex-M4F, M33): 192 x 192 cells of 20 cm.
+/// For a board with a few hundred kilobytes (Cortex-M4F, M33): 160 x 160 cells of 20 cm.
 constexpr Config nano_profile() {
   Config c = micro_profile();
-  c.side = 192;
+  c.side = 160;
   c.cell_m = 0.2F;
-  c.registration_side = 48;
-  c.class_side = 96;
+  c.registration_side = 40;
+  c.class_side = 80;
   c.max_submaps = 24;
   c.max_sessions = 4;
   c.mapper.spare_scans = 4;
