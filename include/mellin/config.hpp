@@ -67,7 +67,7 @@ constexpr Config resolved(const Config& given) {
 }
 
 /// ok, or invalid_config with a line to `log` that names the field, what it is and what it has to be.
-Status validate(const Config& config, Log log = Log());
+Status validate(const Config& given, Log log = Log());
 
 /// A hash of what stored submaps depend on: cell size, sides, digests. A store written under another one is refused.
 constexpr std::uint64_t fingerprint(const Config& c) {

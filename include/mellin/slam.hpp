@@ -54,7 +54,7 @@ class Slam {
   /// Statuses: ok; invalid_config (the log says which field); invalid_argument where memory is not aligned;
   /// insufficient_memory (the log says how many bytes lack); full where the flash holds submaps of max_sessions
   /// sessions already; version_mismatch, bad_data, device_error of the store: the flash is left as it was.
-  static Result<Slam*> create(const Config& config, Span<std::byte> memory, const mellin_port& port,
+  static Result<Slam*> create(const Config& given, Span<std::byte> memory, const mellin_port& port,
                               Span<std::byte> fast = {});
 
   Slam() = default;

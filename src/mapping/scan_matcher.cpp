@@ -314,8 +314,10 @@ Pose2 ScanMatcher::correlate(const LiveGrid& grid, const Pose2& prior, const Sym
   const GridPose at = grid_pose(prior, cell);
   const auto reach = static_cast<std::int32_t>(config_.search_distance_m / cell) / kSearchStep;
   const auto turns = static_cast<std::int32_t>(config_.search_angle_rad / config_.search_angle_step_rad);
-  const std::size_t stride =
-      count_ > config_.search_points ? (count_ + config_.search_points - 1) / config_.search_points : 1;
+  if (count_ == 0 || config_.search_points == 0) {
+    return prior;
+  }
+  const std::size_t stride = (count_ + config_.search_points - 1) / config_.search_points;
   const std::size_t used = (count_ + stride - 1) / stride;
   const auto per_point = static_cast<double>(config_.scan_weight) / static_cast<double>(used * 255);
   const Sym3 stiffness = rotate(prior_information, prior.theta);

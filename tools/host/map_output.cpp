@@ -33,6 +33,7 @@ std::vector<std::vector<SubmapId>> components_of(const MapCollection& map) {
     by_name[map.component(id)].push_back(id);
   }
   std::vector<std::vector<SubmapId>> out;
+  out.reserve(by_name.size());
   for (auto& [name, members] : by_name) {
     out.push_back(std::move(members));
   }

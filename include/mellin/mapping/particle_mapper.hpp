@@ -117,8 +117,8 @@ class ParticleMapper final : public LocalMapper {
   Sym3 prior_information(const Pose2& motion) const;
   ScanUse track(const Pose2& predicted, const Sym3& prior);
   bool take(const Pose2& predicted, const Sym3& prior);
-  bool propose(std::size_t particle, const Pose2& predicted, const Sym3& prior);
-  void remember(std::size_t particle, std::uint32_t number);
+  bool propose(std::size_t index, const Pose2& predicted, const Sym3& prior);
+  void remember(std::size_t index, std::uint32_t number);
   void resample_if_poor();
 
   ParticleMapperConfig config_;
