@@ -163,9 +163,9 @@ TEST_CASE("the same input gives the same bits, however the work is sliced; anoth
   CHECK(once.submaps.size() > 2);
   // One particle does not sample: the seed shows with several.
   config.mapper.particles = 10;
-  config.side = 192;
+  config.side = 160;
   config.cell_m = 0.2F;
-  config.class_side = 96;
+  config.class_side = 80;
   const std::size_t fewer = kSanitized ? 60 : 250;
   const Record sampled = run(config, fewer, 64);
   CHECK(same_bits(sampled, run(config, fewer, 7)));

@@ -48,14 +48,15 @@ void add_pilasters(Floor& floor, int side, Random& random) {
   const double from = ring::side_start(side) + ring::side_length(side);
   for (const double wall : {-ring::kHalfWidth_m, ring::kHalfWidth_m}) {
     const double inwards = wall < 0.0 ? 1.0 : -1.0;
-    for (double way = between_limits(random, 0.5, 2.0); way < ring::kBend_m - 1.1;
-         way += between_limits(random, 1.8, 3.5)) {
+    double way = between_limits(random, 0.5, 2.0);
+    while (way < ring::kBend_m - 1.1) {
       const Pose2 frame = ring::centre_line(from + way);
       const double width = between_limits(random, 0.5, 1.0);
       const double top = wall + inwards * between_limits(random, 0.3, 0.6);
       add_wall(floor, frame, 0.0, wall, 0.0, top);
       add_wall(floor, frame, 0.0, top, width, top);
       add_wall(floor, frame, width, top, width, wall);
+      way += between_limits(random, 1.8, 3.5);
     }
   }
 }
