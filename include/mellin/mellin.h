@@ -372,7 +372,7 @@ mellin_status mellin_read_edge(const mellin_slam* slam, uint32_t index, mellin_e
 
 /// Of local mapping, mellin::MapperStatistics.
 typedef struct mellin_mapper_statistics {
-  uint32_t scans;  ///< given
+  uint32_t scans;  ///< given, refused ones included
   uint32_t taken;
   uint32_t unmatched;  ///< rode on odometry
   uint32_t refused;    ///< MELLIN_BAD_DATA

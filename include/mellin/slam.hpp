@@ -10,6 +10,7 @@
 
 namespace mellin {
 
+/// Since create(), over all sessions.
 struct SlamStatistics {
   std::uint32_t submaps_due = 0;
   std::uint32_t submaps_delayed = 0;  ///< due while the one before was not finished: started later, with newer scans

@@ -14,11 +14,12 @@
 #include "host/report.hpp"
 #include "host/settings.hpp"
 #include "host/tum.hpp"
+#include "mellin/mellin.h"
 
 namespace mellin::host {
 namespace {
 
-constexpr const char* kVersion = "0.1.0";
+constexpr const char* kVersion = MELLIN_VERSION_STRING;
 
 std::uint64_t peak_rss_bytes() {
   rusage usage{};

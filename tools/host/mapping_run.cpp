@@ -187,7 +187,6 @@ void MappingRun::map(const Log& log, const std::vector<std::uint8_t>& lasers,
     throw std::runtime_error(log.path + ": the session cannot be flushed");
   }
   drain();
-  sessions_.back().mapper = slam_->mapper().statistics();
 }
 
 std::vector<StampedPose> MappingRun::live_trajectory(const MappedSession& session) const {

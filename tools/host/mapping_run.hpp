@@ -35,7 +35,6 @@ struct MappedSession {
     double weight = 0.0;
   };
   std::vector<std::vector<Placement>> placements;
-  MapperStatistics mapper;
 };
 
 /// Adds the lasers of a log to a configuration; returns the index in Config::lasers of each. Throws where there are

@@ -27,8 +27,10 @@ struct ScanOutcome {
   Pose2 anchor_T_base;            ///< … and the pose relative to it, which later corrections leave as it is
 };
 
+/// Since the mapper was made: reset() leaves them as they are, so that what went wrong before a new session is still
+/// seen.
 struct MapperStatistics {
-  std::uint32_t scans = 0;  ///< given
+  std::uint32_t scans = 0;  ///< given, refused ones included
   std::uint32_t taken = 0;
   std::uint32_t unmatched = 0;  ///< rode on odometry
   std::uint32_t refused = 0;    ///< bad_data
