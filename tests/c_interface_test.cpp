@@ -24,6 +24,18 @@ using mellin::test::measure;
 using mellin::test::room;
 using mellin::test::span;
 
+// What c_interface.hpp shows.
+constexpr mellin_config configuration() {
+  mellin_config config = c_config(MELLIN_PROFILE_MICRO);
+  config.lasers[0].beams = 180;
+  return config;
+}
+extern "C" {
+extern const mellin_config slam_config = configuration();
+alignas(MELLIN_ARENA_ALIGNMENT) unsigned char slam_memory[required_bytes(config_of(configuration()))];
+extern const std::size_t slam_memory_bytes = sizeof slam_memory;
+}
+
 namespace {
 
 constexpr std::uint16_t kBeams = 90;
@@ -394,34 +406,29 @@ TEST_CASE("a profile comes through unchanged, and each field changes the setting
 }
 
 TEST_CASE("sizes are known at compile time too, and memory by region and part adds up") {
-  constexpr mellin_config kConfig = [] {
-    mellin_config c = c_config(MELLIN_PROFILE_MICRO);
-    c.lasers[0].beams = 180;
-    return c;
-  }();
-  constexpr std::size_t kBytes = required_bytes(config_of(kConfig));
-  CHECK(mellin_required_bytes(&kConfig) == kBytes);
+  const std::size_t all = slam_memory_bytes;
+  CHECK(mellin_required_bytes(&slam_config) == all);
   mellin_memory_use required = {};
-  REQUIRE(mellin_required_memory(&kConfig, &required) == MELLIN_OK);
-  CHECK(required.bulk + required.fast == kBytes);
+  REQUIRE(mellin_required_memory(&slam_config, &required) == MELLIN_OK);
+  CHECK(required.bulk + required.fast == all);
   CHECK(required.fast > 0);
   std::size_t sum = 0;
   for (const std::size_t bytes : required.by_part) {
     sum += bytes;
   }
-  CHECK(sum == kBytes);
+  CHECK(sum == all);
 
   // In one region, with one byte less, and in two regions.
-  std::vector<std::uint64_t> bulk(kBytes / 8);
+  std::vector<std::uint64_t> bulk(required.bulk / 8);
   std::vector<std::uint64_t> fast(required.fast / 8);
   mellin_slam* slam = nullptr;
-  CHECK(mellin_create(&kConfig, bulk.data(), kBytes - 1, nullptr, &slam) == MELLIN_INSUFFICIENT_MEMORY);
-  CHECK(mellin_create(&kConfig, bulk.data(), kBytes, nullptr, &slam) == MELLIN_OK);
-  CHECK(mellin_create_split(&kConfig, bulk.data(), required.bulk - 1, fast.data(), required.fast, nullptr, &slam) ==
+  CHECK(mellin_create(&slam_config, slam_memory, all - 1, nullptr, &slam) == MELLIN_INSUFFICIENT_MEMORY);
+  CHECK(mellin_create(&slam_config, slam_memory, all, nullptr, &slam) == MELLIN_OK);
+  CHECK(mellin_create_split(&slam_config, bulk.data(), required.bulk - 1, fast.data(), required.fast, nullptr, &slam) ==
         MELLIN_INSUFFICIENT_MEMORY);
-  CHECK(mellin_create_split(&kConfig, bulk.data(), required.bulk, fast.data(), required.fast - 1, nullptr, &slam) ==
+  CHECK(mellin_create_split(&slam_config, bulk.data(), required.bulk, fast.data(), required.fast - 1, nullptr, &slam) ==
         MELLIN_INSUFFICIENT_MEMORY);
-  REQUIRE(mellin_create_split(&kConfig, bulk.data(), required.bulk, fast.data(), required.fast, nullptr, &slam) ==
+  REQUIRE(mellin_create_split(&slam_config, bulk.data(), required.bulk, fast.data(), required.fast, nullptr, &slam) ==
           MELLIN_OK);
   mellin_memory_use used = {};
   REQUIRE(mellin_read_memory_use(slam, &used) == MELLIN_OK);

@@ -1,5 +1,20 @@
 // Where the C interface (mellin.h) and the C++ one meet: for the one C++ file of a C firmware that sizes its memory at
-// compile time, or sets what mellin_config does not name.
+// compile time, or sets what mellin_config does not name. Memory of the size that it takes, for `extern unsigned char
+// slam_memory[];` in C:
+//
+//   constexpr mellin_config configuration() {
+//     mellin_config config = mellin::c_config(MELLIN_PROFILE_MICRO);
+//     config.lasers[0].beams = 180;
+//     return config;
+//   }
+//   extern "C" {
+//   extern const mellin_config slam_config = configuration();
+//   alignas(MELLIN_ARENA_ALIGNMENT) unsigned char
+//   slam_memory[mellin::required_bytes(mellin::config_of(configuration()))]; extern const std::size_t slam_memory_bytes
+//   = sizeof slam_memory;
+//   }
+//
+// And any setting at all: config_of(), then a field of mellin::Config, then Slam::create() and handle_of().
 #pragma once
 
 #include <cstddef>

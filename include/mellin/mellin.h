@@ -12,7 +12,7 @@
 ///     else { (void)mellin_work(slam, 1); }
 ///   }
 ///
-/// Nothing here allocates, throws or blocks. Calls on one mellin_slam must not overlap; different ones are independent.
+/// Nothing here allocates, throws or waits. Calls on one mellin_slam must not overlap; different ones are independent.
 /// Every function that takes pointers requires them, unless it says that NULL means something: a null pointer is a bug
 /// of the caller, an assert in debug builds and MELLIN_INVALID_ARGUMENT in release builds. Where a function does not
 /// return MELLIN_OK, what its pointers lead to is as it was, unless it says otherwise.
@@ -199,14 +199,9 @@ typedef struct mellin_memory_use {
 /// Bytes that mellin_create() needs, exactly; 0 for a configuration that it would refuse. Cost: some hundred
 /// operations.
 ///
-/// It is computed at run time. For a constant, to size an array with: one C++ file of the firmware writes
-///
-///   constexpr mellin_config config = …;  // c_config() of c_interface.hpp, and changes to it
-///   extern "C" alignas(MELLIN_ARENA_ALIGNMENT) std::byte
-///   slam_memory[mellin::required_bytes(mellin::config_of(config))];
-///
-/// or the array is given by hand: where it is too small, mellin_create() says in the port's log how many bytes it
-/// lacks. The number depends on the configuration and on the width of a pointer.
+/// It is computed at run time, from the configuration and the width of a pointer. For a constant, to size an array
+/// with, c_interface.hpp shows the few lines of C++ that it takes. Or the array is sized by hand: where it is too
+/// small, mellin_create() refuses it and says in the port's log how many bytes it lacks.
 size_t mellin_required_bytes(const mellin_config* config);
 
 /// The same by region and by part. MELLIN_INVALID_CONFIG: mellin_create() would refuse it.

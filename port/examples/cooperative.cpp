@@ -21,7 +21,7 @@ constexpr mellin::Config configure() {
   mellin::Config config = mellin::nano_profile();
   config.lasers[0].beams = SIMULATED_BEAMS;
   config.lasers[0].angle_min_rad = static_cast<float>(-mellin::kPi);
-  config.lasers[0].angle_increment_rad = static_cast<float>(mellin::kTwoPi / SIMULATED_BEAMS);
+  config.lasers[0].angle_increment_rad = static_cast<float>(mellin::kTwoPi / double{SIMULATED_BEAMS});
   config.lasers[0].max_range_m = 20.0F;
   config.side = 160;
   config.cell_m = 0.1F;
