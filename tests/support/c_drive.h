@@ -1,4 +1,4 @@
-/* A mapping run through the C interface, written in C99, for the suite c_interface. */
+/* A mapping run through the C interface, written in C99, for the suites c_interface and c_config. */
 #ifndef MELLIN_TESTS_C_DRIVE_H
 #define MELLIN_TESTS_C_DRIVE_H
 
