@@ -3,7 +3,7 @@
 #include <doctest.h>
 
 #include <algorithm>
-#include <eigen3/Eigen/Dense>
+#include <Eigen/Dense>
 #include <set>
 #include <vector>
 
@@ -162,7 +162,7 @@ TEST_CASE("solutions agree with a dense factorisation") {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Problem p(4 + static_cast<std::uint32_t>(seed * 2), 6 + static_cast<std::uint32_t>(seed * 4), 2000, seed);
     REQUIRE(p.analyse(kUnbounded) == Status::ok);
-    for (const std::uint32_t budget : {1U, kUnbounded}) {
+    for (const std::uint32_t budget : {std::uint32_t{1}, kUnbounded}) {
       p.assemble(seed);
       REQUIRE(p.factorise(budget) == Status::ok);
       const Eigen::VectorXd right = Eigen::VectorXd::LinSpaced(3 * p.n, -1.0, 2.0);

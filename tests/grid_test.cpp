@@ -76,8 +76,8 @@ TEST_CASE("a ray meets one cell a step along its longer axis, joined, and ends w
     const auto cells = cells_of(ray, kEverywhere);
     const int major = std::max(std::abs(ray.column_to - ray.column_from), std::abs(ray.row_to - ray.row_from));
     REQUIRE(static_cast<int>(cells.size()) == major + 1);
-    CHECK(cells.front() == std::pair(ray.column_from, ray.row_from));
-    CHECK(cells.back() == std::pair(ray.column_to, ray.row_to));
+    CHECK(cells.front() == std::pair<int, int>(ray.column_from, ray.row_from));
+    CHECK(cells.back() == std::pair<int, int>(ray.column_to, ray.row_to));
     for (std::size_t k = 1; k < cells.size(); ++k) {
       CHECK(std::abs(cells[k].first - cells[k - 1].first) <= 1);
       CHECK(std::abs(cells[k].second - cells[k - 1].second) <= 1);

@@ -76,7 +76,7 @@ bool holds(TestStore& t, const Model& model) {
 
 StoreConfig config_for(const Geometry& geometry) {
   StoreConfig config = small_config();
-  config.page_bytes = static_cast<std::uint16_t>(std::max(256U, geometry.unit));
+  config.page_bytes = static_cast<std::uint16_t>(std::max<std::uint32_t>(256, geometry.unit));
   return config;
 }
 
