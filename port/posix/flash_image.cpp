@@ -181,12 +181,4 @@ ImageInfo probe_image(const std::string& path) {
   return info;
 }
 
-RamFlash::RamFlash(const FlashGeometry& geometry)
-    : bytes_(geometry.valid() ? geometry.bytes() : 0, port::kErasedByte),
-      model_(geometry, Span<std::uint8_t>(bytes_.data(), bytes_.size())) {
-  if (!geometry.valid()) {
-    throw std::runtime_error("the flash geometry contradicts itself");
-  }
-}
-
 }  // namespace mellin::posix

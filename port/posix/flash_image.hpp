@@ -1,4 +1,4 @@
-// Flash on a host: over an image file that outlives the program, or in memory. As strict as the real thing: what was
+// Flash on a host: over an image file that outlives the program. As strict as the real thing: what was
 // not erased since it was last programmed cannot be programmed.
 #pragma once
 
@@ -56,21 +56,5 @@ struct ImageInfo {
 /// Looks for block headers in an image. Throws std::runtime_error, naming the file, where it cannot be read, holds
 /// none, or has not the size that they tell.
 ImageInfo probe_image(const std::string& path);
-
-/// The same rules in memory, for runs that keep nothing.
-class RamFlash {
- public:
-  /// Throws std::runtime_error where the geometry is none.
-  explicit RamFlash(const FlashGeometry& geometry);
-
-  /// Valid as long as this object.
-  mellin_flash flash() { return model_.flash(); }
-  const FlashCounts& counts() const { return model_.counts(); }
-  std::vector<std::uint8_t>& bytes() { return bytes_; }
-
- private:
-  std::vector<std::uint8_t> bytes_;
-  port::FlashModel model_;
-};
 
 }  // namespace mellin::posix
