@@ -3,8 +3,7 @@
 #include <doctest.h>
 
 #include <algorithm>
-#include <eigen3/Eigen/Dense>
-#include <set>
+#include <Eigen/Dense>
 #include <vector>
 
 #include "mellin/core/random.hpp"
@@ -88,9 +87,24 @@ struct Problem {
   }
 };
 
+/// A set of few numbers.
+class NumberSet {
+ public:
+  void insert(std::uint32_t number) {
+    const auto at = std::lower_bound(numbers_.begin(), numbers_.end(), number);
+    if (at == numbers_.end() || *at != number) {
+      numbers_.insert(at, number);
+    }
+  }
+  const std::vector<std::uint32_t>& sorted() const { return numbers_; }
+
+ private:
+  std::vector<std::uint32_t> numbers_;
+};
+
 /// Blocks of L below the diagonal under an order, by elimination on sets.
 std::size_t fill_by_sets(const Problem& p) {
-  std::vector<std::set<std::uint32_t>> later(p.n);
+  std::vector<NumberSet> later(p.n);
   for (const BlockPair& pair : p.pairs) {
     if (pair.a != pair.b) {
       const std::uint32_t a = p.cholesky.ordering().position(pair.a);
@@ -100,10 +114,10 @@ std::size_t fill_by_sets(const Problem& p) {
   }
   std::size_t fill = 0;
   for (std::uint32_t j = 0; j < p.n; ++j) {
-    fill += later[j].size();
-    if (!later[j].empty()) {
-      const std::uint32_t parent = *later[j].begin();
-      later[parent].insert(std::next(later[j].begin()), later[j].end());
+    const std::vector<std::uint32_t>& rows = later[j].sorted();
+    fill += rows.size();
+    for (std::size_t i = 1; i < rows.size(); ++i) {
+      later[rows[0]].insert(rows[i]);
     }
   }
   return fill;
@@ -118,13 +132,13 @@ TEST_CASE("the order is a permutation and the pattern is exactly that of its eli
     Problem p(5 + static_cast<std::uint32_t>(seed * 3), 4 + static_cast<std::uint32_t>(seed * 5), 8000, seed);
     REQUIRE(p.analyse(seed % 2 == 0 ? kUnbounded : 3) == Status::ok);
     const BlockOrdering& order = p.cholesky.ordering();
-    std::set<std::uint32_t> columns;
+    NumberSet columns;
     for (std::uint32_t i = 0; i < p.n; ++i) {
       columns.insert(order.position(i));
       CHECK(order.variable(order.position(i)) == i);
     }
-    CHECK(columns.size() == p.n);
-    CHECK(*columns.rbegin() == p.n - 1);
+    CHECK(columns.sorted().size() == p.n);
+    CHECK(columns.sorted().back() == p.n - 1);
     CHECK(order.fill() == fill_by_sets(p));
   }
 }
@@ -162,7 +176,7 @@ TEST_CASE("solutions agree with a dense factorisation") {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Problem p(4 + static_cast<std::uint32_t>(seed * 2), 6 + static_cast<std::uint32_t>(seed * 4), 2000, seed);
     REQUIRE(p.analyse(kUnbounded) == Status::ok);
-    for (const std::uint32_t budget : {1U, kUnbounded}) {
+    for (const std::uint32_t budget : {std::uint32_t{1}, kUnbounded}) {
       p.assemble(seed);
       REQUIRE(p.factorise(budget) == Status::ok);
       const Eigen::VectorXd right = Eigen::VectorXd::LinSpaced(3 * p.n, -1.0, 2.0);

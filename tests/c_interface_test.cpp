@@ -15,7 +15,7 @@
 
 #include "host/heap_counter.hpp"
 #include "posix/clock.hpp"
-#include "posix/flash_image.hpp"
+#include "ramflash/heap_flash.hpp"
 #include "tests/support/c_drive.h"
 #include "tests/support/room.hpp"
 #include "tests/support/simulated_log.hpp"
@@ -86,11 +86,9 @@ class Drive {
   std::vector<Scan> scans_;
 };
 
-constexpr posix::FlashGeometry kGeometry = {4096, 512, 256};
-
 /// Memory, flash and port of one system.
 struct Board {
-  posix::RamFlash flash{kGeometry};
+  port::HeapFlash flash{port::FlashGeometry{4096, 512, 256}};
   mellin_port port = {};
   std::vector<std::uint64_t> memory;
   std::size_t bytes = 0;

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "mellin/collection/map_collection.hpp"
-#include "posix/flash_image.hpp"
+#include "ramflash/heap_flash.hpp"
 #include "tests/store_fixture.hpp"
 
 using namespace mellin;
@@ -178,7 +178,7 @@ bool shares(std::uint32_t a, std::uint32_t b) { return b - a < 4; }  // 40 scans
 }  // namespace
 
 TEST_CASE("each pair that shares no scans is screened once, as it comes, and no other") {
-  posix::RamFlash flash({4096, 256, 256});
+  port::HeapFlash flash({4096, 256, 256});
   Bench bench(flash.flash());
   bench.session(1);
   for (std::uint32_t i = 0; i < 12; ++i) {
@@ -210,7 +210,7 @@ TEST_CASE("each pair that shares no scans is screened once, as it comes, and no 
 }
 
 TEST_CASE("of the pairs that look alike the best are registered, best first, one a place") {
-  posix::RamFlash flash({4096, 256, 256});
+  port::HeapFlash flash({4096, 256, 256});
   CollectionConfig config;
   config.candidates = 3;
   config.candidate_agreement = 0.3F;
@@ -254,7 +254,7 @@ TEST_CASE("of the pairs that look alike the best are registered, best first, one
 }
 
 TEST_CASE("loops that the matchers find become edges and mend the poses") {
-  posix::RamFlash flash({4096, 256, 256});
+  port::HeapFlash flash({4096, 256, 256});
   Bench bench(flash.flash());
   bench.digests.agreement = [](std::uint32_t, std::uint32_t) { return 0.9F; };
   bench.session(1);
@@ -275,7 +275,7 @@ TEST_CASE("loops that the matchers find become edges and mend the poses") {
   // Switched off, no pair is looked at.
   CollectionConfig off_config;
   off_config.close_loops = false;
-  posix::RamFlash other({4096, 256, 256});
+  port::HeapFlash other({4096, 256, 256});
   Bench none(other.flash(), off_config);
   none.session(1);
   for (std::uint32_t i = 0; i < 8; ++i) {
@@ -300,7 +300,7 @@ TEST_CASE("without flash only what is still in RAM can be registered, the rest i
 }
 
 TEST_CASE("a restart finds submaps, digests, sessions and edges again, also after a crash without a flush") {
-  posix::RamFlash flash({4096, 256, 256});
+  port::HeapFlash flash({4096, 256, 256});
   std::vector<std::uint8_t> digests;
   std::vector<Pose2> poses;
   {
@@ -366,7 +366,7 @@ TEST_CASE("a restart finds submaps, digests, sessions and edges again, also afte
 }
 
 TEST_CASE("a full flash loses what does not fit, says so, and the map goes on in RAM") {
-  posix::RamFlash flash({4096, 10, 256});
+  port::HeapFlash flash({4096, 10, 256});
   Bench bench(flash.flash());
   bench.session(1);
   for (std::uint32_t i = 0; i < 40; ++i) {

@@ -1,7 +1,6 @@
 #include <doctest.h>
 
 #include <cmath>
-#include <map>
 #include <utility>
 #include <vector>
 
@@ -9,6 +8,7 @@
 #include "mellin/grid/counting_grid.hpp"
 #include "mellin/mapping/live_grid.hpp"
 #include "mellin/mapping/scan_memory.hpp"
+#include "tests/support/cell_map.hpp"
 
 using namespace mellin;
 
@@ -76,8 +76,8 @@ TEST_CASE("a ray meets one cell a step along its longer axis, joined, and ends w
     const auto cells = cells_of(ray, kEverywhere);
     const int major = std::max(std::abs(ray.column_to - ray.column_from), std::abs(ray.row_to - ray.row_from));
     REQUIRE(static_cast<int>(cells.size()) == major + 1);
-    CHECK(cells.front() == std::pair(ray.column_from, ray.row_from));
-    CHECK(cells.back() == std::pair(ray.column_to, ray.row_to));
+    CHECK(cells.front() == std::pair<int, int>(ray.column_from, ray.row_from));
+    CHECK(cells.back() == std::pair<int, int>(ray.column_to, ray.row_to));
     for (std::size_t k = 1; k < cells.size(); ++k) {
       CHECK(std::abs(cells[k].first - cells[k - 1].first) <= 1);
       CHECK(std::abs(cells[k].second - cells[k - 1].second) <= 1);
@@ -149,15 +149,13 @@ TEST_CASE("any sequence of adds, rolls and removals equals the grid rebuilt from
           r.rect = intersection(r.rect, live.grid().window());
         }
       }
-      // Brute force: every beam walked cell by cell with its own clipping, into a map.
-      std::map<std::pair<int, int>, CellCount> expected;
+      // Brute force: every beam walked cell by cell with its own clipping, into an array.
+      mellin::test::CellMap expected;
       for (const Remembered& r : memory) {
         world.scans.visit_rays(r.number, grid_pose(r.pose, World::kCell), World::kCell, [&](const Ray& ray) {
           visit_ray(ray, kEverywhere, [&](std::int32_t c, std::int32_t row, bool hit) {
             if (r.rect.contains(c, row)) {
-              CellCount& cell = expected[{c, row}];
-              ++cell.observations;
-              cell.hits = static_cast<std::uint16_t>(cell.hits + (hit ? 1 : 0));
+              expected.count(c, row, hit);
             }
           });
         });
@@ -166,16 +164,14 @@ TEST_CASE("any sequence of adds, rolls and removals equals the grid rebuilt from
       int wrong_counts = 0, wrong_field = 0;
       for (int row = w.row_min; row < w.row_end; ++row) {
         for (int c = w.column_min; c < w.column_end; ++c) {
-          const auto found = expected.find({c, row});
-          const CellCount want = found == expected.end() ? CellCount{} : found->second;
+          const CellCount want = expected.at(c, row);
           const CellCount have = live.grid().at(c, row);
           wrong_counts += want.observations != have.observations || want.hits != have.hits ? 1 : 0;
           int nearest = 0;
           for (int dy = -2; dy <= 2; ++dy) {
             for (int dx = -2; dx <= 2; ++dx) {
-              const auto neighbour = expected.find({c + dx, row + dy});
-              if (neighbour != expected.end() && w.contains(c + dx, row + dy)) {
-                nearest = std::max<int>(nearest, field_value(solidity(neighbour->second), dx, dy));
+              if (w.contains(c + dx, row + dy)) {
+                nearest = std::max<int>(nearest, field_value(solidity(expected.at(c + dx, row + dy)), dx, dy));
               }
             }
           }

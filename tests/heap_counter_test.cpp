@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "posix/flash_image.hpp"
+#include "ramflash/heap_flash.hpp"
 #include "store_fixture.hpp"
 
 using namespace mellin;
@@ -101,7 +101,7 @@ TEST_CASE("a callback of the port that allocates is found out, the store itself 
   if (!counting()) {
     return;
   }
-  posix::RamFlash flash({4096, 64, 256});
+  port::HeapFlash flash({4096, 64, 256});
   std::vector<std::string> lines;
   const mellin_log log = {&lines, [](void* context, mellin_log_level, const char* line) {
                             static_cast<std::vector<std::string>*>(context)->emplace_back(line);

@@ -3,7 +3,7 @@
 #include <doctest.h>
 
 #include <cmath>
-#include <eigen3/Eigen/Dense>
+#include <Eigen/Dense>
 #include <limits>
 #include <vector>
 

@@ -11,6 +11,7 @@
 #include "host/image_store.hpp"
 #include "posix/entropy.hpp"
 #include "posix/flash_image.hpp"
+#include "ramflash/heap_flash.hpp"
 #include "store_fixture.hpp"
 
 using namespace mellin;
@@ -97,7 +98,7 @@ TEST_CASE("the image file and the one in memory keep the rules of flash") {
     check_rules(image.flash(), image.counts());
   }
   CHECK(fs::file_size(folder.file("a.img")) == 262144);
-  RamFlash ram(kGeometry);
+  port::HeapFlash ram(kGeometry);
   check_rules(ram.flash(), ram.counts());
 }
 

@@ -5,7 +5,7 @@
 
 #include "host/mapping_run.hpp"
 #include "host/scorer.hpp"
-#include "posix/flash_image.hpp"
+#include "ramflash/heap_flash.hpp"
 #include "tests/host_support.hpp"
 #include "tests/support/simulated_log.hpp"
 
@@ -29,7 +29,7 @@ Run map_log(const std::string& log_path, const std::string& truth_path, const st
   const host::Log log = host::read_carmen_log(log_path);
   Config config = micro_profile();
   const std::vector<std::uint8_t> lasers = host::add_lasers(config, log);
-  posix::RamFlash flash({});
+  port::HeapFlash flash({});
   host::MappingRun run(config, flash.flash(), {});
   run.map(log, lasers, {});
   const host::MappedSession& session = run.sessions().front();

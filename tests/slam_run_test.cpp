@@ -9,7 +9,7 @@
 #include "host/heap_counter.hpp"
 #include "host/mapping_run.hpp"
 #include "host/scorer.hpp"
-#include "posix/flash_image.hpp"
+#include "ramflash/heap_flash.hpp"
 #include "tests/support/simulated_log.hpp"
 
 using namespace mellin;
@@ -78,7 +78,7 @@ bool same_bits(const Record& a, const Record& b) {
 
 /// Runs the first `scans` of the drive, draining the work after each in slices of `budget`.
 Record run(const Config& config, std::size_t scans, std::uint32_t budget) {
-  posix::RamFlash flash({4096, 1024, 256});
+  port::HeapFlash flash({4096, 1024, 256});
   mellin_port port = {};
   port.flash = flash.flash();
   std::vector<std::uint64_t> memory(required_bytes(config) / 8);
@@ -117,7 +117,7 @@ std::size_t count_edges(const PoseGraph& graph, EdgeKind kind) {
 }  // namespace
 
 TEST_CASE("twice round a building: loops are closed and mend the trajectory; the heap is not touched") {
-  posix::RamFlash flash({});
+  port::HeapFlash flash({});
   const host::Log& log = drive().log;
   host::reset_heap_counts();
   host::MappingRun run(config_for(log), flash.flash(), {});
@@ -174,7 +174,7 @@ TEST_CASE("the same input gives the same bits, however the work is sliced; anoth
 }
 
 TEST_CASE("a robot restarted over its flash finds its whole map and goes on from it") {
-  posix::RamFlash flash({});
+  port::HeapFlash flash({});
   const host::Log& log = drive().log;
   const Config config = config_for(log);
   std::vector<Pose2> submaps;

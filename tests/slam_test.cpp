@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "host/heap_counter.hpp"
-#include "posix/flash_image.hpp"
+#include "ramflash/heap_flash.hpp"
 #include "tests/store_fixture.hpp"
 #include "tests/support/room.hpp"
 
@@ -145,7 +145,7 @@ TEST_CASE("create() uses exactly required_bytes(): enough in it, one byte less r
   for (const Config& config : configs()) {
     CAPTURE(index++);
     const std::size_t bytes = required_bytes(config);
-    posix::RamFlash flash({4096, 512, 256});
+    port::HeapFlash flash({4096, 512, 256});
     std::vector<std::string> lines;
     mellin_port port = {};
     port.flash = flash.flash();
@@ -465,7 +465,7 @@ TEST_CASE("library calls leave the heap alone") {
     return;
   }
   const Config config = small();
-  posix::RamFlash flash({4096, 512, 256});
+  port::HeapFlash flash({4096, 512, 256});
   mellin_port port = {};
   port.flash = flash.flash();
   GuardedMemory memory(required_bytes(config));

@@ -2,9 +2,9 @@
 #include <doctest.h>
 
 #include <algorithm>
-#include <map>
 
 #include "store_fixture.hpp"
+#include "tests/support/sorted_map.hpp"
 
 using namespace mellin;
 using namespace mellin::test;
@@ -18,7 +18,7 @@ struct Content {
   Bytes cells;
   Bytes blob;
 };
-using Model = std::map<SubmapId, Content>;
+using Model = SortedMap<SubmapId, Content>;
 
 Bytes blob_of(const SubmapStore& store, std::uint32_t id) {
   Bytes out(10'000);
@@ -76,7 +76,7 @@ bool holds(TestStore& t, const Model& model) {
 
 StoreConfig config_for(const Geometry& geometry) {
   StoreConfig config = small_config();
-  config.page_bytes = static_cast<std::uint16_t>(std::max(256U, geometry.unit));
+  config.page_bytes = static_cast<std::uint16_t>(std::max<std::uint32_t>(256, geometry.unit));
   return config;
 }
 

@@ -10,7 +10,7 @@
 #include "mellin/c_interface.hpp"
 #include "mellin/core/log.hpp"
 #include "mellin/slam.hpp"
-#include "ram_flash.h"
+#include "ramflash/flash_model.hpp"
 #include "simulated_robot.h"
 
 namespace {
@@ -32,7 +32,9 @@ constexpr mellin::Config configure() {
 constexpr mellin::Config kConfig = configure();
 
 alignas(mellin::kArenaAlignment) std::byte memory[mellin::required_bytes(kConfig)];
-ram_flash flash;
+
+constexpr mellin::port::FlashGeometry kFlash = {4096, 64, 16};
+std::uint8_t flash_bytes[kFlash.bytes()];
 
 /// The sensor and its interrupt: every period a scan is laid into a mailbox for one, whoever computes.
 class Sensor {
@@ -200,8 +202,10 @@ const char* judge_at_leisure(const mellin::Slam& slam, const Sensor& sensor) {
 
 /// One drive with a scan every so often; a new system over a new flash. nullptr, or what went wrong.
 const char* drive(std::uint64_t period_us, bool at_leisure, Figures& figures) {
+  mellin::port::FlashModel flash(kFlash, flash_bytes);
+  flash.erase_all();
   mellin_port port = {};
-  port.flash = ram_flash_create(&flash);
+  port.flash = flash.flash();
   port.log.write = [](void*, mellin_log_level, const char* line) { example_print(line); };
   const mellin::Result<mellin::Slam*> made = mellin::Slam::create(kConfig, memory, port);
   if (!made.ok()) {

@@ -15,27 +15,7 @@ namespace {
 
 constexpr int kRefused = -1;
 constexpr int kFileError = -2;
-constexpr std::uint8_t kErased = 0xFF;
 constexpr std::uint64_t kMostBytes = std::uint64_t{1} << 32U;
-
-std::uint64_t bytes_of(const FlashGeometry& g) { return std::uint64_t{g.block_size} * g.block_count; }
-
-bool is_geometry(const FlashGeometry& g) {
-  return g.program_unit != 0 && g.block_size != 0 && g.block_size % g.program_unit == 0 && g.block_count >= 2 &&
-         bytes_of(g) <= kMostBytes;
-}
-
-bool inside(const FlashGeometry& g, std::uint32_t address, std::uint32_t size) {
-  return std::uint64_t{address} + size <= bytes_of(g);
-}
-
-bool programmable(const FlashGeometry& g, std::uint32_t address, std::uint32_t size) {
-  return inside(g, address, size) && address % g.program_unit == 0 && size % g.program_unit == 0;
-}
-
-bool erased(const std::uint8_t* bytes, std::size_t size) {
-  return std::all_of(bytes, bytes + size, [](std::uint8_t byte) { return byte == kErased; });
-}
 
 /// pread and pwrite may do less than they were asked for.
 bool read_all(int file, std::uint8_t* buffer, std::size_t size, std::uint64_t at) {
@@ -79,21 +59,11 @@ std::uint64_t file_size(int file) {
   throw std::runtime_error(path + ": " + what);
 }
 
-mellin_flash describe(void* context, const FlashGeometry& g) {
-  mellin_flash flash{};
-  flash.context = context;
-  flash.block_size = g.block_size;
-  flash.block_count = g.block_count;
-  flash.program_unit = g.program_unit;
-  flash.erased_value = kErased;
-  return flash;
-}
-
 }  // namespace
 
 FlashImage::FlashImage(const std::string& path, const FlashGeometry& geometry, bool read_only)
     : path_(path), geometry_(geometry), scratch_(geometry.block_size), read_only_(read_only) {
-  if (!is_geometry(geometry)) {
+  if (!geometry.valid()) {
     fail(path, "the flash geometry contradicts itself");
   }
   file_ = ::open(path.c_str(), (read_only ? O_RDONLY : O_RDWR | O_CREAT) | O_CLOEXEC, 0644);
@@ -103,10 +73,10 @@ FlashImage::FlashImage(const std::string& path, const FlashGeometry& geometry, b
   const std::uint64_t size = file_size(file_);
   if (size == 0 && !read_only) {
     create();
-  } else if (size != bytes_of(geometry)) {
+  } else if (size != geometry.bytes()) {
     ::close(file_);
     fail(path,
-         "expected a flash image of " + std::to_string(bytes_of(geometry)) + " bytes, found " + std::to_string(size));
+         "expected a flash image of " + std::to_string(geometry.bytes()) + " bytes, found " + std::to_string(size));
   }
 }
 
@@ -114,7 +84,7 @@ FlashImage::~FlashImage() { ::close(file_); }
 
 void FlashImage::create() {
   created_ = true;
-  std::fill(scratch_.begin(), scratch_.end(), kErased);
+  std::fill(scratch_.begin(), scratch_.end(), port::kErasedByte);
   for (std::uint32_t block = 0; block < geometry_.block_count; ++block) {
     if (!write_all(file_, scratch_.data(), scratch_.size(), std::uint64_t{block} * geometry_.block_size)) {
       const std::string why = std::strerror(errno);
@@ -126,7 +96,7 @@ void FlashImage::create() {
 }
 
 mellin_flash FlashImage::flash() {
-  mellin_flash flash = describe(this, geometry_);
+  mellin_flash flash = port::describe(this, geometry_);
   flash.read = read;
   flash.program = program;
   flash.erase = erase;
@@ -136,7 +106,7 @@ mellin_flash FlashImage::flash() {
 
 int FlashImage::read(void* context, std::uint32_t address, void* buffer, std::uint32_t size) {
   const auto& self = *static_cast<const FlashImage*>(context);
-  if (!inside(self.geometry_, address, size)) {
+  if (!self.geometry_.inside(address, size)) {
     return kRefused;
   }
   return read_all(self.file_, static_cast<std::uint8_t*>(buffer), size, address) ? 0 : kFileError;
@@ -144,7 +114,7 @@ int FlashImage::read(void* context, std::uint32_t address, void* buffer, std::ui
 
 int FlashImage::program(void* context, std::uint32_t address, const void* data, std::uint32_t size) {
   auto& self = *static_cast<FlashImage*>(context);
-  if (!programmable(self.geometry_, address, size) || self.read_only_) {
+  if (!self.geometry_.programmable(address, size) || self.read_only_) {
     return kRefused;
   }
   if (self.scratch_.size() < size) {
@@ -153,7 +123,7 @@ int FlashImage::program(void* context, std::uint32_t address, const void* data, 
   if (!read_all(self.file_, self.scratch_.data(), size, address)) {
     return kFileError;
   }
-  if (!erased(self.scratch_.data(), size)) {
+  if (!port::is_erased(Span<const std::uint8_t>(self.scratch_.data(), size))) {
     return kRefused;
   }
   ++self.counts_.programs;
@@ -167,7 +137,7 @@ int FlashImage::erase(void* context, std::uint32_t block) {
     return kRefused;
   }
   ++self.counts_.erases;
-  std::fill(self.scratch_.begin(), self.scratch_.end(), kErased);
+  std::fill(self.scratch_.begin(), self.scratch_.end(), port::kErasedByte);
   const std::uint64_t at = std::uint64_t{block} * self.geometry_.block_size;
   return write_all(self.file_, self.scratch_.data(), self.geometry_.block_size, at) ? 0 : kFileError;
 }
@@ -204,63 +174,11 @@ ImageInfo probe_image(const std::string& path) {
   if (!found) {
     fail(path, "no block header found: this is no flash image of a submap store");
   }
-  if (!is_geometry(geometry) || bytes_of(geometry) != size) {
+  if (!geometry.valid() || geometry.bytes() != size) {
     fail(path, "expected " + std::to_string(geometry.block_count) + " blocks of " +
                    std::to_string(geometry.block_size) + " bytes, found " + std::to_string(size) + " bytes");
   }
   return info;
-}
-
-RamFlash::RamFlash(const FlashGeometry& geometry) : geometry_(geometry) {
-  if (!is_geometry(geometry)) {
-    throw std::runtime_error("the flash geometry contradicts itself");
-  }
-  bytes_.assign(bytes_of(geometry), kErased);
-}
-
-mellin_flash RamFlash::flash() {
-  mellin_flash flash = describe(this, geometry_);
-  flash.read = read;
-  flash.program = program;
-  flash.erase = erase;
-  flash.sync = sync;
-  return flash;
-}
-
-int RamFlash::read(void* context, std::uint32_t address, void* buffer, std::uint32_t size) {
-  const auto& self = *static_cast<const RamFlash*>(context);
-  if (!inside(self.geometry_, address, size)) {
-    return kRefused;
-  }
-  std::memcpy(buffer, self.bytes_.data() + address, size);
-  return 0;
-}
-
-int RamFlash::program(void* context, std::uint32_t address, const void* data, std::uint32_t size) {
-  auto& self = *static_cast<RamFlash*>(context);
-  if (!programmable(self.geometry_, address, size) || !erased(self.bytes_.data() + address, size)) {
-    return kRefused;
-  }
-  ++self.counts_.programs;
-  self.counts_.programmed_bytes += size;
-  std::memcpy(self.bytes_.data() + address, data, size);
-  return 0;
-}
-
-int RamFlash::erase(void* context, std::uint32_t block) {
-  auto& self = *static_cast<RamFlash*>(context);
-  if (block >= self.geometry_.block_count) {
-    return kRefused;
-  }
-  ++self.counts_.erases;
-  const auto begin = self.bytes_.begin() + static_cast<std::ptrdiff_t>(block) * self.geometry_.block_size;
-  std::fill(begin, begin + self.geometry_.block_size, kErased);
-  return 0;
-}
-
-int RamFlash::sync(void* context) {
-  ++static_cast<RamFlash*>(context)->counts_.syncs;
-  return 0;
 }
 
 }  // namespace mellin::posix

@@ -1,4 +1,4 @@
-// Flash on a host: over an image file that outlives the program, or in memory. As strict as the real thing: what was
+// Flash on a host: over an image file that outlives the program. As strict as the real thing: what was
 // not erased since it was last programmed cannot be programmed.
 #pragma once
 
@@ -8,21 +8,12 @@
 
 #include "mellin/port.h"
 #include "mellin/store/flash_format.hpp"
+#include "ramflash/flash_model.hpp"
 
 namespace mellin::posix {
 
-struct FlashGeometry {
-  std::uint32_t block_size = 4096;    ///< bytes
-  std::uint32_t block_count = 16384;  ///< 64 MiB
-  std::uint32_t program_unit = 256;   ///< bytes
-};
-
-struct FlashCounts {
-  std::uint64_t programs = 0;
-  std::uint64_t programmed_bytes = 0;
-  std::uint64_t erases = 0;
-  std::uint64_t syncs = 0;
-};
+using port::FlashCounts;
+using port::FlashGeometry;
 
 /// An image file. Calls of the mellin_flash return -1 for what the contract excludes (unaligned or out of the device,
 /// programming what was not erased) and -2 where the file fails.
@@ -65,29 +56,5 @@ struct ImageInfo {
 /// Looks for block headers in an image. Throws std::runtime_error, naming the file, where it cannot be read, holds
 /// none, or has not the size that they tell.
 ImageInfo probe_image(const std::string& path);
-
-/// The same rules in memory, for runs that keep nothing.
-class RamFlash {
- public:
-  /// Throws std::runtime_error where the geometry is none.
-  explicit RamFlash(const FlashGeometry& geometry);
-  RamFlash(const RamFlash&) = delete;
-  RamFlash& operator=(const RamFlash&) = delete;
-
-  /// Valid as long as this object.
-  mellin_flash flash();
-  const FlashCounts& counts() const { return counts_; }
-  std::vector<std::uint8_t>& bytes() { return bytes_; }
-
- private:
-  static int read(void* context, std::uint32_t address, void* buffer, std::uint32_t size);
-  static int program(void* context, std::uint32_t address, const void* data, std::uint32_t size);
-  static int erase(void* context, std::uint32_t block);
-  static int sync(void* context);
-
-  FlashGeometry geometry_;
-  FlashCounts counts_;
-  std::vector<std::uint8_t> bytes_;
-};
 
 }  // namespace mellin::posix

@@ -15,6 +15,7 @@
 #include "host/mapping_run.hpp"
 #include "host/settings.hpp"
 #include "posix/flash_image.hpp"
+#include "ramflash/heap_flash.hpp"
 #include "program/commands.hpp"
 
 namespace mellin::program {
@@ -124,11 +125,11 @@ void run_map(const MapOptions& options) {
   std::filesystem::create_directories(options.directory);
 
   std::unique_ptr<posix::FlashImage> image;
-  std::unique_ptr<posix::RamFlash> ram;
+  std::unique_ptr<port::HeapFlash> ram;
   std::unique_ptr<StoredLog> stored;
   mellin_flash flash = {};
   if (options.store.empty()) {
-    ram = std::make_unique<posix::RamFlash>(posix::FlashGeometry{});
+    ram = std::make_unique<port::HeapFlash>(port::FlashGeometry{});
     flash = ram->flash();
   } else {
     image = std::make_unique<posix::FlashImage>(options.store, posix::FlashGeometry{});

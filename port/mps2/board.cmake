@@ -1,0 +1,13 @@
+# ARM's MPS2 board as QEMU emulates it, with the FPGA images of application notes AN386, AN500 and AN505.
+string(REGEX MATCH "an[0-9]+$" MELLIN_FPGA ${MELLIN_BOARD})
+set(MELLIN_CMSDK_TIMER 0x40000000)
+set(MELLIN_PROFILE micro)
+if(MELLIN_FPGA STREQUAL an386)
+  set(MELLIN_PROFILE nano)
+elseif(MELLIN_FPGA STREQUAL an505)
+  set(MELLIN_CMSDK_TIMER 0x50000000) # the secure alias
+  set(MELLIN_PROFILE nano)
+endif()
+set(MELLIN_BOARD_SOURCES ${MELLIN_CORTEX_M_SOURCES} ${MELLIN_BARE_METAL}/counter_cmsdk.c)
+set(MELLIN_LINKER_SCRIPT ${CMAKE_CURRENT_SOURCE_DIR}/mps2/${MELLIN_FPGA}.ld)
+set(MELLIN_BOARD_LINK_OPTIONS --specs=nano.specs)
