@@ -11,7 +11,7 @@ static simulated_robot robot;
 static mellin_slam* slam;
 static const char* failure;
 
-enum { ROUNDS = 5, SLICES_PER_SCAN = 60 };
+enum { ROUNDS = 3, SLICES_PER_SCAN = 60 };
 
 /* Whether a condition holds; if not, it is why the example fails. */
 static bool must(bool condition, const char* otherwise) {

@@ -15,7 +15,7 @@
 
 namespace {
 
-constexpr int kScans = 5 * SIMULATED_STEPS_PER_ROUND;
+constexpr int kScans = 3 * SIMULATED_STEPS_PER_ROUND;
 
 constexpr mellin::Config configure() {
   mellin::Config config = mellin::nano_profile();
