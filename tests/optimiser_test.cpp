@@ -9,6 +9,7 @@
 
 #include "graph/edge_terms.hpp"
 #include "graph_rig.hpp"
+#include "tests/support/trials.hpp"
 
 using namespace mellin;
 using mellin::test::fill_random;
@@ -358,7 +359,7 @@ TEST_CASE("graphs beyond the optimiser's size and options out of range are refus
 }
 
 TEST_CASE("wild numbers within the limits end without a crash and with finite poses") {
-  for (std::uint64_t seed = 0; seed < 30; ++seed) {
+  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(test::trials(30)); ++seed) {
     GraphRig rig(config_for(20, 60, 200));
     Random random(seed, 8);
     const auto wild = [&] { return random.normal() * std::pow(10.0, 12.0 * random.uniform() - 4.0); };

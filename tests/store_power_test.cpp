@@ -5,6 +5,7 @@
 
 #include "store_fixture.hpp"
 #include "tests/support/sorted_map.hpp"
+#include "tests/support/trials.hpp"
 
 using namespace mellin;
 using namespace mellin::test;
@@ -97,7 +98,7 @@ void cut_everywhere(const Geometry& geometry, bool reorder) {
   const std::uint64_t length = script_length(geometry);
   int wrong = 0;
   int whole = 0;
-  for (std::uint64_t cut = 0; cut < length; ++cut) {
+  for (std::uint64_t cut = 0; cut < length; cut += 20 / static_cast<std::uint64_t>(trials(20))) {
     TornFlash flash(geometry);
     Model stored;
     Model under_way;
@@ -197,7 +198,7 @@ TEST_CASE("a bit flip costs at most what it hits, and never gives wrong content"
   int wrong = 0;
   std::size_t hurt = 0;
   std::size_t worst = 2 * model.size();
-  for (int trial = 0; trial < 1500; ++trial) {
+  for (int trial = 0; trial < trials(1500); ++trial) {
     TornFlash flash(geometry);
     flash.bytes() = image;
     const std::size_t bit = random() % (used * 8);
@@ -220,7 +221,7 @@ TEST_CASE("a bit flip costs at most what it hits, and never gives wrong content"
     wrong += right < 2 * model.size() && !told && readable ? 1 : 0;
   }
   CHECK(wrong == 0);
-  CHECK(hurt > 500);  // the flips do hit something
+  CHECK(hurt > static_cast<std::size_t>(trials(1500)) / 3);  // the flips do hit something
   CHECK(worst >= 4);  // a damaged block header takes a block of 4 KiB with it, no more
 }
 
@@ -252,7 +253,7 @@ TEST_CASE("truncated images, with the end erased or zero, keep what lies before"
   const Bytes image = written_image(geometry, model);
   int wrong = 0;
   std::size_t last = 0;
-  for (std::size_t keep = 4096; keep < image.size(); keep += 777) {
+  for (std::size_t keep = 4096; keep < image.size(); keep += 777 * 20 / static_cast<std::size_t>(trials(20))) {
     for (const std::uint8_t fill : {std::uint8_t{0xFF}, std::uint8_t{0}}) {
       TornFlash flash(geometry);
       flash.bytes() = image;
@@ -271,7 +272,7 @@ TEST_CASE("truncated images, with the end erased or zero, keep what lies before"
 TEST_CASE("random bytes and hostile records neither crash nor loop") {
   const Geometry geometry{4096, 16, 256};
   Random32 random(11);
-  for (int trial = 0; trial < 300; ++trial) {
+  for (int trial = 0; trial < trials(300); ++trial) {
     TornFlash flash(geometry);
     const std::uint32_t kind = random() % 3;
     Bytes& bytes = flash.bytes();

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "store_fixture.hpp"
+#include "tests/support/trials.hpp"
 
 using namespace mellin;
 using namespace mellin::test;
@@ -71,7 +72,7 @@ TEST_CASE("tiles cover the grid once, cut off at its edges") {
 TEST_CASE("every grid survives, and so does every tile that fits, whatever room there is") {
   Random32 random(5);
   std::uint32_t tiles = 0;
-  for (int trial = 0; trial < 400; ++trial) {
+  for (int trial = 0; trial < trials(400); ++trial) {
     const auto side = static_cast<std::uint16_t>(2 + 2 * (random() % 60));
     Bytes cells =
         trial % 4 == 0 ? random_bytes(std::size_t{side} * side, random()) : room_grid(side < 16 ? 16 : side, random());

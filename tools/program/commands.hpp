@@ -9,6 +9,7 @@ namespace mellin::program {
 void add_map(CLI::App& app);       ///< mellin map
 void add_match(CLI::App& app);     ///< mellin match
 void add_optimize(CLI::App& app);  ///< mellin optimize
+void add_record(CLI::App& app);    ///< mellin record
 void add_score(CLI::App& app);     ///< mellin score
 void add_sim(CLI::App& app);       ///< mellin sim
 void add_store(CLI::App& app);     ///< mellin store

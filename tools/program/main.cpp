@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   mellin::program::add_map(app);
   mellin::program::add_match(app);
   mellin::program::add_optimize(app);
+  mellin::program::add_record(app);
   mellin::program::add_score(app);
   mellin::program::add_sim(app);
   mellin::program::add_store(app);
