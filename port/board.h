@@ -1,6 +1,6 @@
 /* What the firmware images of port/images ask of a board: a console, files of the machine that debugs or emulates it, a
- * counter, and the way out. The library knows nothing of this; what it asks of a platform is mellin/port.h. A real board
- * answers through its debugger's semihosting, or with an UART and a RAM disk. */
+ * counter, and the way out. The library knows nothing of this; what it asks of a platform is mellin/port.h. A real
+ * board answers through its debugger's semihosting, or with an UART and a RAM disk. */
 #ifndef MELLIN_BOARD_H
 #define MELLIN_BOARD_H
 

@@ -2,8 +2,8 @@
 
 #include <doctest.h>
 
-#include <algorithm>
 #include <Eigen/Dense>
+#include <algorithm>
 #include <vector>
 
 #include "mellin/core/random.hpp"

@@ -86,11 +86,10 @@ ParticleMapperConfig mapper_config(std::uint16_t particles = 1) {
 constexpr CellRect kEverywhere{-100000, -100000, 100000, 100000};
 
 /// Every beam of a scan walked cell by cell, without clipping.
-void count(mellin::test::CellMap& counts, const ScanMemory& scans, std::uint32_t number, const Pose2& pose, float cell_m) {
+void count(mellin::test::CellMap& counts, const ScanMemory& scans, std::uint32_t number, const Pose2& pose,
+           float cell_m) {
   scans.visit_rays(number, grid_pose(pose, cell_m), cell_m, [&](const Ray& ray) {
-    visit_ray(ray, kEverywhere, [&](std::int32_t c, std::int32_t r, bool hit) {
-      counts.count(c, r, hit);
-    });
+    visit_ray(ray, kEverywhere, [&](std::int32_t c, std::int32_t r, bool hit) { counts.count(c, r, hit); });
   });
 }
 

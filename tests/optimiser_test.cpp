@@ -2,8 +2,8 @@
 
 #include <doctest.h>
 
-#include <cmath>
 #include <Eigen/Dense>
+#include <cmath>
 #include <limits>
 #include <vector>
 

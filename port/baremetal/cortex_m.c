@@ -26,8 +26,19 @@ typedef union vector {
   void (*handler)(void);
 } vector;
 
-__attribute__((section(".vectors"), used)) static const vector vectors[16] = {
-    {__stack_top},           {.handler = __reset},      {.handler = unexpected}, {.handler = hard_fault},
-    {.handler = memory_fault}, {.handler = bus_fault},  {.handler = usage_fault}, {.handler = unexpected},
-    {0},                     {0},                     {0},                     {.handler = unexpected},
-    {.handler = unexpected}, {0},                     {.handler = unexpected}, {.handler = unexpected}};
+__attribute__((section(".vectors"), used)) static const vector vectors[16] = {{__stack_top},
+                                                                              {.handler = __reset},
+                                                                              {.handler = unexpected},
+                                                                              {.handler = hard_fault},
+                                                                              {.handler = memory_fault},
+                                                                              {.handler = bus_fault},
+                                                                              {.handler = usage_fault},
+                                                                              {.handler = unexpected},
+                                                                              {0},
+                                                                              {0},
+                                                                              {0},
+                                                                              {.handler = unexpected},
+                                                                              {.handler = unexpected},
+                                                                              {0},
+                                                                              {.handler = unexpected},
+                                                                              {.handler = unexpected}};

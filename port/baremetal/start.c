@@ -1,11 +1,12 @@
 /* From the reset handler to main(): memory as C and C++ expect it, and a painted stack. Symbols in double underscores
  * are the linker script's (sections.ld). */
+#include "start.h"
+
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
 
 #include "board.h"
-#include "start.h"
 
 extern uint32_t __data_load[], __data_start[], __data_end[];
 extern uint32_t __bss_start[], __bss_end[];

@@ -10,19 +10,19 @@
 namespace mellin::image {
 
 enum class Cost : std::uint8_t {
-  taken_scan,    ///< Slam::add of a scan that is added to the live map
-  other_scan,    ///< Slam::add of one that is only matched
-  rendering,     ///< a slice of Slam::work that does this, and so on
+  taken_scan,  ///< Slam::add of a scan that is added to the live map
+  other_scan,  ///< Slam::add of one that is only matched
+  rendering,   ///< a slice of Slam::work that does this, and so on
   screening,
   registration,
   optimisation,
   store,
-  linking,       ///< none of the clocks ran: choosing and judging
+  linking,  ///< none of the clocks ran: choosing and judging
   count
 };
 
 inline const char* to_string(Cost cost) {
-  constexpr const char* kNames[] = {"add, taken",         "add, matched only",  "slice of rendering",
+  constexpr const char* kNames[] = {"add, taken",         "add, matched only",     "slice of rendering",
                                     "slice of screening", "slice of registration", "slice of optimisation",
                                     "slice of storing",   "slice of linking"};
   return kNames[static_cast<std::size_t>(cost)];

@@ -171,9 +171,9 @@ class Job {
     for (SubmapId id = 0; id < map.size() && (id == 0 || map.header(id).first_scan <= record.anchor_scan); ++id) {
       home = id;
     }
-    return home == kNoSubmap ? record.session_T_base
-                             : compose(map.map_T_submap(home),
-                                       between(map.header(home).session_T_submap, record.session_T_base));
+    return home == kNoSubmap
+               ? record.session_T_base
+               : compose(map.map_T_submap(home), between(map.header(home).session_T_submap, record.session_T_base));
   }
 
   bool write_trajectory() {

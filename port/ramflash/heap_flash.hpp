@@ -13,7 +13,8 @@ namespace mellin::port {
 class HeapFlash {
  public:
   explicit HeapFlash(const FlashGeometry& geometry)
-      : bytes_(static_cast<std::size_t>(geometry.bytes()), kErasedByte), model_(geometry, Span<std::uint8_t>(bytes_.data(), bytes_.size())) {
+      : bytes_(static_cast<std::size_t>(geometry.bytes()), kErasedByte),
+        model_(geometry, Span<std::uint8_t>(bytes_.data(), bytes_.size())) {
     assert(geometry.valid());
   }
 

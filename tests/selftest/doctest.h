@@ -59,22 +59,23 @@ void check(bool passed, const char* file, int line, const char* expression);
 
 #define MELLIN_JOIN_(a, b) a##b
 #define MELLIN_JOIN(a, b) MELLIN_JOIN_(a, b)
-#define MELLIN_CASE(function, name)                                                        \
-  static void function();                                                                  \
+#define MELLIN_CASE(function, name)                                                          \
+  static void function();                                                                    \
   static const mellin::selftest::Registration MELLIN_JOIN(function, _entry)(name, function); \
   static void function()
 
 #define TEST_CASE(name) MELLIN_CASE(MELLIN_JOIN(mellin_case_, __LINE__), name)
 #define TEST_SUITE(name) namespace MELLIN_JOIN(mellin_suite_, __LINE__)
 #define CHECK(...) mellin::selftest::check(static_cast<bool>(__VA_ARGS__), __FILE__, __LINE__, #__VA_ARGS__)
-#define CHECK_FALSE(...) mellin::selftest::check(!static_cast<bool>(__VA_ARGS__), __FILE__, __LINE__, "not " #__VA_ARGS__)
-#define REQUIRE(...)                                                                      \
-  do {                                                                                    \
-    const bool mellin_passed = static_cast<bool>(__VA_ARGS__);                            \
-    mellin::selftest::check(mellin_passed, __FILE__, __LINE__, #__VA_ARGS__);             \
-    if (!mellin_passed) {                                                                 \
-      mellin::selftest::leave_case();                                                     \
-    }                                                                                     \
+#define CHECK_FALSE(...) \
+  mellin::selftest::check(!static_cast<bool>(__VA_ARGS__), __FILE__, __LINE__, "not " #__VA_ARGS__)
+#define REQUIRE(...)                                                          \
+  do {                                                                        \
+    const bool mellin_passed = static_cast<bool>(__VA_ARGS__);                \
+    mellin::selftest::check(mellin_passed, __FILE__, __LINE__, #__VA_ARGS__); \
+    if (!mellin_passed) {                                                     \
+      mellin::selftest::leave_case();                                         \
+    }                                                                         \
   } while (false)
 #define REQUIRE_FALSE(...) REQUIRE(!static_cast<bool>(__VA_ARGS__))
 #define CAPTURE(...) static_cast<void>(0)

@@ -1,4 +1,5 @@
-// How often a randomised test tries: on an emulated microcontroller, a fiftieth as fast as the host, a twentieth as often.
+// How often a randomised test tries: on an emulated microcontroller, a fiftieth as fast as the host, a twentieth as
+// often.
 #pragma once
 
 namespace mellin::test {

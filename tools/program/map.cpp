@@ -15,8 +15,8 @@
 #include "host/mapping_run.hpp"
 #include "host/settings.hpp"
 #include "posix/flash_image.hpp"
-#include "ramflash/heap_flash.hpp"
 #include "program/commands.hpp"
+#include "ramflash/heap_flash.hpp"
 
 namespace mellin::program {
 namespace {
