@@ -150,7 +150,7 @@ TEST_CASE("any sequence of adds, rolls and removals equals the grid rebuilt from
         }
       }
       // Brute force: every beam walked cell by cell with its own clipping, into an array.
-      mellin::test::CellMap expected;
+      mellin::test::CellMap expected(live.grid().window());
       for (const Remembered& r : memory) {
         world.scans.visit_rays(r.number, grid_pose(r.pose, World::kCell), World::kCell, [&](const Ray& ray) {
           visit_ray(ray, kEverywhere, [&](std::int32_t c, std::int32_t row, bool hit) {

@@ -238,11 +238,11 @@ TEST_CASE("the live map is that of the remembered scans, whatever came before") 
         continue;
       }
       const ScanMemory& scans = m.mapper.scans();
-      mellin::test::CellMap expected;
+      const CellRect w = m.mapper.live_map().window();
+      mellin::test::CellMap expected(w);
       for (std::uint32_t n = m.mapper.first_remembered(); n < scans.end(); ++n) {
         count(expected, scans, n, m.mapper.scan_pose(n), config.cell_m);
       }
-      const CellRect w = m.mapper.live_map().window();
       std::size_t wrong = 0, hits = 0;
       for (std::int32_t r = w.row_min; r < w.row_end; ++r) {
         for (std::int32_t c = w.column_min; c < w.column_end; ++c) {
@@ -369,7 +369,7 @@ TEST_CASE("a submap is the frozen scans rendered in one piece, whatever the band
     CHECK(header.session_T_submap.x == doctest::Approx((low_x + high_x) / 2));
     CHECK(header.session_T_submap.y == doctest::Approx((low_y + high_y) / 2));
     CHECK(translation(between(compose(header.session_T_submap, header.submap_T_robot), mapper.pose())) < 1e-9);
-    mellin::test::CellMap counts;
+    mellin::test::CellMap counts({-128, -128, 128, 128});
     for (std::uint32_t n = 5; n < 15; ++n) {
       count(counts, mapper.scans(), n, between(header.session_T_submap, mapper.scan_pose(n)), config.cell_m);
     }

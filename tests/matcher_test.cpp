@@ -10,6 +10,7 @@
 #include "mellin/core/random.hpp"
 #include "mellin/grid/digest.hpp"
 #include "tests/golden/spectral.hpp"
+#include "tests/support/trials.hpp"
 
 using namespace mellin;
 
@@ -273,7 +274,7 @@ TEST_SUITE("matcher") {
     const double pixel = 0.4;
     Bench bench(config_of(side, static_cast<float>(pixel)));
     Random random(11, 0);
-    for (int i = 0; i < 36; ++i) {
+    for (int i = 0; i < test::trials(36); ++i) {
       CAPTURE(i);
       const std::vector<Wall> walls = office(static_cast<std::uint64_t>(i) / 6);
       const Pose2 w_T_a{4.0 * random.uniform() - 2.0, 3.0 * random.uniform() - 1.5, kTwoPi * random.uniform()};
@@ -299,7 +300,7 @@ TEST_SUITE("matcher") {
     const double pixel = 0.1;
     Bench bench(config_of(side, static_cast<float>(pixel)));
     Random random(12, 0);
-    for (int i = 0; i < 6; ++i) {
+    for (int i = 0; i < test::trials(6); ++i) {
       CAPTURE(i);
       const std::vector<Wall> walls = office(static_cast<std::uint64_t>(i));
       const Pose2 a_T_b{6.0 * random.uniform() - 3.0, 6.0 * random.uniform() - 3.0, wrap_angle(i + random.uniform())};
@@ -318,7 +319,7 @@ TEST_SUITE("matcher") {
       return digest_of(render(office(seed), pose, 384, 0.1, 17.0), 384, 96);
     };
     const float same = bench.match(picture(1, {}), picture(1, {2.0, 1.0, 0.7}))[0].peak;
-    for (std::uint64_t seed = 2; seed < 8; ++seed) {
+    for (std::uint64_t seed = 2; seed < 2U + static_cast<std::uint64_t>(test::trials(6)); ++seed) {
       CHECK(bench.match(picture(1, {}), picture(seed, {2.0, 1.0, 0.7}))[0].peak < 0.5F * same);
     }
   }

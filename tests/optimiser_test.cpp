@@ -182,7 +182,7 @@ TEST_CASE("a square whose corners were measured too wide closes with the error o
 }
 
 TEST_CASE("random graphs reach the optimum of a dense solver, by either solver and from either start") {
-  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(test::trials(6)); ++seed) {
     for (const std::uint32_t fill : {400U, 30U}) {
       for (const Start start : {Start::current, Start::chordal}) {
         GraphRig rig(config_for(30, 60, fill));

@@ -1,5 +1,5 @@
-// Counts by cell of the world grid, for brute-force references: a dense square, since tests stay in rooms and targets
-// have no C++ library that could keep a tree.
+// Counts by cell of the world grid, for brute-force references: dense, since targets have no C++ library that
+// could keep a tree.
 #pragma once
 
 #include <cstddef>
@@ -12,29 +12,33 @@ namespace mellin::test {
 
 class CellMap {
  public:
-  /// Cells from -reach to reach - 1 in both directions.
-  explicit CellMap(std::int32_t reach = 400)
-      : reach_(reach), cells_(static_cast<std::size_t>(4 * reach) * static_cast<std::size_t>(reach)) {}
+  /// The cells of a rectangle; counts elsewhere are dropped.
+  explicit CellMap(const CellRect& rect)
+      : rect_(rect),
+        cells_(static_cast<std::size_t>(rect.column_end - rect.column_min) *
+               static_cast<std::size_t>(rect.row_end - rect.row_min)) {}
 
-  /// Counts a beam. Requires the cell to be in reach.
+  /// Counts a beam.
   void count(std::int32_t column, std::int32_t row, bool hit) {
-    CellCount& cell = cells_.at(index(column, row));
-    ++cell.observations;
-    cell.hits = static_cast<decltype(cell.hits)>(cell.hits + (hit ? 1 : 0));
+    if (rect_.contains(column, row)) {
+      CellCount& cell = cells_[index(column, row)];
+      ++cell.observations;
+      cell.hits = static_cast<decltype(cell.hits)>(cell.hits + (hit ? 1 : 0));
+    }
   }
   /// Zeros where nothing was counted.
   CellCount at(std::int32_t column, std::int32_t row) const {
-    return inside(column) && inside(row) ? cells_[index(column, row)] : CellCount{};
+    return rect_.contains(column, row) ? cells_[index(column, row)] : CellCount{};
   }
 
  private:
-  bool inside(std::int32_t i) const { return i >= -reach_ && i < reach_; }
   std::size_t index(std::int32_t column, std::int32_t row) const {
-    return static_cast<std::size_t>(row + reach_) * static_cast<std::size_t>(2 * reach_) +
-           static_cast<std::size_t>(column + reach_);
+    return static_cast<std::size_t>(row - rect_.row_min) *
+               static_cast<std::size_t>(rect_.column_end - rect_.column_min) +
+           static_cast<std::size_t>(column - rect_.column_min);
   }
 
-  std::int32_t reach_;
+  CellRect rect_;
   std::vector<CellCount> cells_;
 };
 
