@@ -62,7 +62,8 @@ class Slam {
   Slam& operator=(const Slam&) = delete;
 
   /// Takes the next scan. bad_data: the scan is not what the configuration says, or its odometry is not finite; it is
-  /// ignored and counted. Cost bounded by the configuration; does no background work.
+  /// ignored and counted, see MapperStatistics. A stamp that jumps or stands still is counted only: scans count in the
+  /// order in which they come. Cost bounded by the configuration; does no background work.
   Result<ScanOutcome> add(const Scan& scan);
 
   /// Does up to `budget` slices of background work, at least one where there is any. Returns whether there is more.

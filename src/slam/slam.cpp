@@ -62,6 +62,9 @@ Status Slam::init(const Config& config, const Memory& memory, const mellin_port&
   while (!collection_.idle()) {
     collection_.step();  // restores what the store holds
   }
+  if (collection_.restored() != Status::ok) {
+    return collection_.restored();
+  }
   return collection_.begin_session(new_session_id());
 }
 
