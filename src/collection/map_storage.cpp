@@ -227,16 +227,20 @@ void MapCollection::restore_gap() {
   ++statistics_.submaps_missing;
 }
 
-/// Links the submaps of a session across those that are missing between them. At most count_ visits of all edges.
+/// Links the submaps of a session across what is missing between them: a submap, or an edge whose older end was not
+/// known to be stored. At most one visit of all edges for each submap, and mostly one visit in all.
 void MapCollection::bridge_gaps() {
+  std::uint32_t odometry_edges = 0;
+  for (EdgeId edge = 0; edge < graph_.edge_count(); ++edge) {
+    odometry_edges += graph_.edge(edge).kind == EdgeKind::odometry ? 1U : 0U;
+  }
+  if (odometry_edges + session_count_ >= count_) {
+    return;
+  }
   SubmapId last = kNoSubmap;
   bool whole = true;
   for (SubmapId id = 0; id < count_; ++id) {
-    bool linked = false;
-    for (EdgeId edge = 0; edge < graph_.edge_count(); ++edge) {
-      linked = linked || (graph_.edge(edge).kind == EdgeKind::odometry && graph_.edge(edge).b == id);
-    }
-    whole = whole && linked;
+    whole = whole && has_odometry_edge(id);
     if (memory_.scans[id].count == 0) {
       continue;
     }
@@ -248,11 +252,18 @@ void MapCollection::bridge_gaps() {
   }
 }
 
+bool MapCollection::has_odometry_edge(SubmapId newer) const {
+  for (EdgeId edge = 0; edge < graph_.edge_count(); ++edge) {
+    if (graph_.edge(edge).kind == EdgeKind::odometry && graph_.edge(edge).b == newer) {
+      return true;
+    }
+  }
+  return false;
+}
+
 void MapCollection::restore_edge() {
   if (record_ >= store_->blob_count(kEdgeRecord)) {
-    if (statistics_.submaps_missing + statistics_.records_damaged > 0) {
-      bridge_gaps();
-    }
+    bridge_gaps();
     record_ = 0;
     stage_ = Stage::restore_poses;
     return;

@@ -267,11 +267,15 @@ Status FlashLog::open_block() {
       return status;
     }
   }
+  const std::uint32_t newest = newest_block_;
   Status status = Status::full;
   while (status != Status::ok && free_blocks() > 0 && newest_sequence_ + 1 < kNumberLimit) {
     const std::uint32_t block = after(newest_block_);
     newest_block_ = block;
     status = start_block(block, newest_sequence_ + 1);
+  }
+  if (status != Status::ok) {
+    newest_block_ = newest;  // it is the device rather than its blocks: they are tried again
   }
   return status;
 }

@@ -213,6 +213,7 @@ class MapCollection {
   void restore_submap();
   void restore_gap();
   void bridge_gaps();
+  bool has_odometry_edge(SubmapId newer) const;
   void restore_edge();
   void restore_pose();
 
