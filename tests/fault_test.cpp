@@ -317,14 +317,18 @@ TEST_CASE("stamps that jump or stand still are counted and change nothing") {
 }
 
 TEST_CASE("a clock of the port that runs back disturbs nothing but times") {
-  std::uint64_t now = 1000;
+  std::uint64_t now = UINT64_MAX;
   mellin_port port = {};
-  port.clock = {&now, [](void* context) { return *static_cast<std::uint64_t*>(context) -= 7; }};
+  port.clock = {&now, [](void* context) { return --*static_cast<std::uint64_t*>(context); }};
   Machine machine(small(), port);
   REQUIRE(machine.status == Status::ok);
   circle(*machine, 0, 60);
   CHECK(off_truth(*machine, 59) < kCell_m);
   CHECK(machine->collection().size() > 0);
+  CHECK(machine->statistics().clock_back > 60);
+  CHECK(machine->statistics().mapping_us == 0);
+  CHECK(machine->statistics().rendering_us == 0);
+  CHECK(machine->collection().statistics().screening_us + machine->collection().statistics().store_us == 0);
 }
 
 TEST_CASE("flash that fails while the robot maps: counted, the map goes on, and what was stored stays") {

@@ -16,6 +16,7 @@ struct SlamStatistics {
   std::uint32_t submaps_lost = 0;     ///< not kept: no room in the collection, or their scans were overwritten
   std::uint64_t mapping_us = 0;       ///< in add(), by the port's clock
   std::uint64_t rendering_us = 0;
+  std::uint32_t clock_back = 0;  ///< times that the port's clock ran back in add() or work(); no time is then counted
 };
 
 /// Where the robot is in the map of its component.
@@ -110,6 +111,7 @@ class Slam {
   void render_slice();
   void hand_over();
   bool pending() const;
+  void count_since(std::uint64_t before_us, std::uint64_t& spent_us);
   std::uint64_t now_us() const { return clock_.now_us != nullptr ? clock_.now_us(clock_.context) : 0; }
 
   Config config_;

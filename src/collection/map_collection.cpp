@@ -114,7 +114,8 @@ void MapCollection::step() {
   std::uint64_t* const spent = stage_clock();
   const std::uint64_t before = clock_.now_us != nullptr ? clock_.now_us(clock_.context) : 0;
   run_slice();
-  *spent += clock_.now_us != nullptr ? clock_.now_us(clock_.context) - before : 0;
+  const std::uint64_t after = clock_.now_us != nullptr ? clock_.now_us(clock_.context) : 0;
+  *spent += after >= before ? after - before : 0;
 }
 
 void MapCollection::run_slice() {
