@@ -10,12 +10,14 @@
 
 #include "ramflash/heap_flash.hpp"
 #include "store_fixture.hpp"
+#include "tests/support/machine.hpp"
 
 using namespace mellin;
 using mellin::host::heap_counts;
 using mellin::host::heap_is_counted;
 using mellin::host::LibraryCall;
 using mellin::host::reset_heap_counts;
+using namespace mellin::test;
 
 namespace {
 
@@ -119,4 +121,33 @@ TEST_CASE("a callback of the port that allocates is found out, the store itself 
     CHECK(t.store.is_resident(0));
     CHECK((counts.allocations > 0) == allocates);
   }
+}
+
+TEST_CASE("library calls leave the heap alone") {
+  if (!host::heap_is_counted()) {
+    MESSAGE("not counted under sanitizers");
+    return;
+  }
+  const Config config = small();
+  port::HeapFlash flash({4096, 512, 256});
+  mellin_port port = {};
+  port.flash = flash.flash();
+  GuardedMemory memory(required_bytes(config));
+  std::vector<std::vector<float>> scans;
+  for (int i = 0; i < 60; ++i) {
+    scans.push_back(measure(room(), on_circle(i), config.lasers[0]));
+  }
+  host::reset_heap_counts();
+  {
+    const host::LibraryCall inside;
+    Result<Slam*> made = Slam::create(config, memory.span(), port);
+    REQUIRE(made.ok());
+    for (int i = 0; i < 60; ++i) {
+      (void)made.value()->add({0, span(scans[static_cast<std::size_t>(i)]), on_circle(i), 0}).ok();
+      drain(*made.value());
+    }
+    (void)made.value()->begin_flush();
+    drain(*made.value());
+  }
+  CHECK(host::heap_counts().allocations == 0);
 }

@@ -9,199 +9,17 @@
 #include <string>
 #include <vector>
 
-#include "host/heap_counter.hpp"
 #include "ramflash/heap_flash.hpp"
 #include "tests/store_fixture.hpp"
-#include "tests/support/room.hpp"
+#include "tests/support/machine.hpp"
 
 using namespace mellin;
-using mellin::test::measure;
-using mellin::test::room;
-using mellin::test::span;
+using namespace mellin::test;
 
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr std::size_t kGuard = 4096;
-constexpr auto kGuardByte = std::byte{0xA5};
-
-Config with_laser(Config config, std::uint16_t beams = 180) {
-  config.lasers[0].beams = beams;
-  config.lasers[0].angle_increment_rad = static_cast<float>(kPi) / static_cast<float>(beams);
-  config.lasers[0].max_range_m = 20.0F;
-  return config;
-}
-
-/// A small configuration, quick to make and to run.
-Config small() {
-  Config config = with_laser(nano_profile(), 90);
-  config.cell_m = 0.1F;
-  config.submaps.every_scans = 4;
-  return config;
-}
-
-/// Memory with guard bytes round it.
-class GuardedMemory {
- public:
-  explicit GuardedMemory(std::size_t size) : size_(size), words_((size + 2 * kGuard) / 8 + 1) {
-    for (std::size_t i = 0; i < words_.size() * 8; ++i) {
-      start()[i] = kGuardByte;
-    }
-  }
-  Span<std::byte> span() { return {start() + kGuard, size_}; }
-  bool intact() {
-    for (std::size_t i = 0; i < kGuard; ++i) {
-      if (start()[i] != kGuardByte || start()[kGuard + size_ + i] != kGuardByte) {
-        return false;
-      }
-    }
-    return true;
-  }
-
- private:
-  std::byte* start() { return reinterpret_cast<std::byte*>(words_.data()); }
-  std::size_t size_;
-  std::vector<std::uint64_t> words_;
-};
-
-mellin_log sink_to(std::vector<std::string>& lines) {
-  return {&lines, [](void* context, mellin_log_level, const char* line) {
-            static_cast<std::vector<std::string>*>(context)->emplace_back(line);
-          }};
-}
-
-/// A robot that circles in the room, with perfect odometry.
-Pose2 on_circle(int step) {
-  const double angle = 0.15 * step;
-  return {2.0 * std::cos(angle) - 1.0, 1.5 * std::sin(angle), angle + kHalfPi};
-}
-
-Result<ScanOutcome> add_at(Slam& slam, const Pose2& pose, std::int64_t stamp_us = 0) {
-  const std::vector<float> ranges = measure(room(), pose, slam.config().lasers[0]);
-  return slam.add({stamp_us, span(ranges), pose, 0});
-}
-
-void drain(Slam& slam) {
-  while (slam.work(64)) {
-  }
-}
-
-void circle(Slam& slam, int from, int to) {
-  for (int i = from; i < to; ++i) {
-    REQUIRE(add_at(slam, on_circle(i), i * 100000).ok());
-    drain(slam);
-  }
-}
-
-/// A system with its memory; no flash unless it is given.
-struct Machine {
-  GuardedMemory memory;
-  Slam* slam = nullptr;
-  Status status = Status::ok;
-
-  explicit Machine(const Config& config, const mellin_port& port = {}) : memory(required_bytes(config)) {
-    Result<Slam*> made = Slam::create(config, memory.span(), port);
-    status = made.status();
-    slam = made.ok() ? made.value() : nullptr;
-  }
-  Slam& operator*() { return *slam; }
-  Slam* operator->() { return slam; }
-};
-
-std::vector<Config> configs() {
-  std::vector<Config> all{with_laser(micro_profile()), with_laser(nano_profile()), with_laser(desktop_profile())};
-  Random random(11, 1);
-  const auto pick = [&](auto... values) {
-    const int options[] = {values...};
-    return options[static_cast<std::size_t>(random.uniform() * sizeof...(values))];
-  };
-  for (int i = 0; i < 10; ++i) {
-    Config c = with_laser(micro_profile(), static_cast<std::uint16_t>(pick(1, 31, 180, 361)));
-    c.side = static_cast<std::uint16_t>(pick(128, 192, 256, 384));
-    c.screening_side = static_cast<std::uint16_t>(c.side / pick(2, 4));
-    c.registration_side = static_cast<std::uint16_t>(c.side / pick(1, 2));
-    c.class_side = static_cast<std::uint16_t>(c.side / pick(1, 2, 4));
-    c.max_submaps = static_cast<std::uint32_t>(pick(2, 7, 33));
-    c.max_sessions = static_cast<std::uint16_t>(pick(1, 3));
-    c.grid_slots = static_cast<std::uint16_t>(pick(2, 3, 5));
-    c.remembered_scans = static_cast<std::uint16_t>(pick(2, 7, 40));
-    c.mapper.particles = static_cast<std::uint16_t>(pick(1, 2, 5));
-    c.mapper.spare_scans = static_cast<std::uint16_t>(pick(1, 3, 12));
-    c.mapper.matcher.search_points = static_cast<std::uint16_t>(pick(1, 13, 72));
-    c.submaps.every_scans = 3;
-    c.submaps.band_rows = static_cast<std::uint16_t>(pick(1, 7, 32, 500));
-    c.screening.cache_features = pick(0, 1) == 1;
-    c.registration.alignment.max_points = static_cast<std::uint16_t>(pick(64, 333, 1024));
-    c.collection.linker.pending = static_cast<std::uint16_t>(pick(1, 5, 64));
-    all.push_back(c);
-  }
-  return all;
-}
-
 }  // namespace
-
-TEST_CASE("create() uses exactly required_bytes(): enough in it, one byte less refused, nothing outside touched") {
-  std::size_t index = 0;
-  for (const Config& config : configs()) {
-    CAPTURE(index++);
-    const std::size_t bytes = required_bytes(config);
-    port::HeapFlash flash({4096, 512, 256});
-    std::vector<std::string> lines;
-    mellin_port port = {};
-    port.flash = flash.flash();
-    port.log = sink_to(lines);
-    {
-      GuardedMemory memory(bytes - 1);
-      CHECK(Slam::create(config, memory.span(), port).status() == Status::insufficient_memory);
-      REQUIRE(!lines.empty());
-      CHECK(lines.back().find("lacks 1 byte") != std::string::npos);
-      CHECK(memory.intact());
-    }
-    Machine machine(config, port);
-    REQUIRE(machine.status == Status::ok);
-    CHECK(machine->arena_use().total() == bytes);
-    std::size_t sum = 0;
-    for (const std::size_t part : machine->arena_use().by_part) {
-      sum += part;
-    }
-    CHECK(sum == bytes);
-    circle(*machine, 0, 30);
-    REQUIRE(machine->begin_flush() == Status::ok);
-    drain(*machine);
-    CHECK(machine->collection().size() > 0);
-    CHECK(machine.memory.intact());
-  }
-}
-
-TEST_CASE("memory may be two regions, a fast one and a bulk one, and the results are the same") {
-  const Config config = small();
-  const ArenaUse use = required_memory(config);
-  REQUIRE(use.fast > 0);
-  CHECK(use.fast + use.bulk == required_bytes(config));
-  GuardedMemory bulk(use.bulk);
-  GuardedMemory fast(use.fast);
-  Result<Slam*> split = Slam::create(config, bulk.span(), {}, fast.span());
-  REQUIRE(split.ok());
-  Machine whole(config);
-  REQUIRE(whole.status == Status::ok);
-  circle(*split.value(), 0, 40);
-  circle(*whole, 0, 40);
-  CHECK(split.value()->pose().x == whole->pose().x);
-  CHECK(split.value()->collection().size() == whole->collection().size());
-  CHECK(bulk.intact());
-  CHECK(fast.intact());
-  GuardedMemory too_small(use.fast - 1);
-  CHECK(Slam::create(config, bulk.span(), {}, too_small.span()).status() == Status::insufficient_memory);
-  GuardedMemory less_bulk(use.bulk - 1);
-  CHECK(Slam::create(config, less_bulk.span(), {}, fast.span()).status() == Status::insufficient_memory);
-}
-
-TEST_CASE("memory that is not aligned is refused") {
-  const Config config = small();
-  GuardedMemory memory(required_bytes(config) + 8);
-  CHECK(Slam::create(config, memory.span().subspan(4, required_bytes(config)), {}).status() ==
-        Status::invalid_argument);
-}
 
 TEST_CASE("validate() refuses each field out of its range and names it") {
   struct Bad {
@@ -264,6 +82,10 @@ TEST_CASE("validate() refuses each field out of its range and names it") {
       {"grid_slots", [](Config& c) { c.grid_slots = 1; }},
       {"max_submaps", [](Config& c) { c.max_submaps = 1; }},
       {"max_submaps", [](Config& c) { c.max_submaps = 70000; }},
+      {"screening_side", [](Config& c) { c.screening_side = 20; }},
+      {"registration_side", [](Config& c) { c.registration_side = 10; }},
+      {"max_fill", [](Config& c) { c.collection.graph.max_fill = c.max_submaps - 1; }},
+      {"work_per_step", [](Config& c) { c.collection.graph.work_per_step = 0; }},
       {"max_sessions", [](Config& c) { c.max_sessions = 0; }},
       {"pending", [](Config& c) { c.collection.linker.pending = 65; }},
       {"base_m", [](Config& c) { c.collection.odometry.base_m = 0.0F; }},
@@ -457,33 +279,4 @@ TEST_CASE("the power may go at any moment of a run: what was reported as stored 
     CHECK(flash.violations() == 0);
   }
   CHECK(with_submaps > 3);
-}
-
-TEST_CASE("library calls leave the heap alone") {
-  if (!host::heap_is_counted()) {
-    MESSAGE("not counted under sanitizers");
-    return;
-  }
-  const Config config = small();
-  port::HeapFlash flash({4096, 512, 256});
-  mellin_port port = {};
-  port.flash = flash.flash();
-  GuardedMemory memory(required_bytes(config));
-  std::vector<std::vector<float>> scans;
-  for (int i = 0; i < 60; ++i) {
-    scans.push_back(measure(room(), on_circle(i), config.lasers[0]));
-  }
-  host::reset_heap_counts();
-  {
-    const host::LibraryCall inside;
-    Result<Slam*> made = Slam::create(config, memory.span(), port);
-    REQUIRE(made.ok());
-    for (int i = 0; i < 60; ++i) {
-      (void)made.value()->add({0, span(scans[static_cast<std::size_t>(i)]), on_circle(i), 0}).ok();
-      drain(*made.value());
-    }
-    (void)made.value()->begin_flush();
-    drain(*made.value());
-  }
-  CHECK(host::heap_counts().allocations == 0);
 }

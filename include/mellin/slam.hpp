@@ -17,6 +17,7 @@ struct SlamStatistics {
   std::uint32_t submaps_lost = 0;     ///< not kept: no room in the collection, or their scans were overwritten
   std::uint64_t mapping_us = 0;       ///< in add(), by the port's clock
   std::uint64_t rendering_us = 0;
+  std::uint32_t clock_back = 0;  ///< times that the port's clock ran back in add() or work(); no time is then counted
 };
 
 /// Where the robot is in the map of its component.
@@ -63,7 +64,8 @@ class Slam {
   Slam& operator=(const Slam&) = delete;
 
   /// Takes the next scan. bad_data: the scan is not what the configuration says, or its odometry is not finite; it is
-  /// ignored and counted. Cost bounded by the configuration; does no background work.
+  /// ignored and counted, see MapperStatistics. A stamp that jumps or stands still is counted only: scans count in the
+  /// order in which they come. Cost bounded by the configuration; does no background work.
   Result<ScanOutcome> add(const Scan& scan);
 
   /// Does up to `budget` slices of background work, at least one where there is any. Returns whether there is more.
@@ -110,6 +112,7 @@ class Slam {
   void render_slice();
   void hand_over();
   bool pending() const;
+  void count_since(std::uint64_t before_us, std::uint64_t& spent_us);
   std::uint64_t now_us() const { return clock_.now_us != nullptr ? clock_.now_us(clock_.context) : 0; }
 
   Config config_;

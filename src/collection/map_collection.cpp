@@ -67,7 +67,17 @@ void MapCollection::link_odometry(SubmapId id, const Sym3& drift) {
   if (newest_ == kNoSubmap) {
     return;
   }
-  const Pose2 step = between(memory_.headers[newest_].session_T_submap, memory_.headers[id].session_T_submap);
+  const Result<EdgeId> edge = add_odometry_edge(newest_, id, drift);
+  if (edge.ok()) {
+    odometry_edge_ = edge.value();
+  } else {
+    log_.write(MELLIN_LOG_WARNING, LogLine() << "submap " << id << ": no odometry edge: " << to_string(edge.status()));
+  }
+}
+
+/// The edge between two submaps of a session, as the local mapper saw them lie; `drift` is what it knows of its error.
+Result<EdgeId> MapCollection::add_odometry_edge(SubmapId a, SubmapId b, const Sym3& drift) {
+  const Pose2 step = between(memory_.headers[a].session_T_submap, memory_.headers[b].session_T_submap);
   const OdometryEdgeNoise& noise = config_.odometry;
   const double distance = translation(step);
   const double m = static_cast<double>(noise.base_m) + static_cast<double>(noise.per_m) * distance;
@@ -76,12 +86,7 @@ void MapCollection::link_odometry(SubmapId id, const Sym3& drift) {
   if (!invert(diagonal(m * m, m * m, rad * rad) + drift, information)) {
     information = diagonal(1.0 / (m * m), 1.0 / (m * m), 1.0 / (rad * rad));
   }
-  const Result<EdgeId> edge = graph_.add_edge(newest_, id, EdgeKind::odometry, step, information);
-  if (edge.ok()) {
-    odometry_edge_ = edge.value();
-  } else {
-    log_.write(MELLIN_LOG_WARNING, LogLine() << "submap " << id << ": no odometry edge: " << to_string(edge.status()));
-  }
+  return graph_.add_edge(a, b, EdgeKind::odometry, step, information);
 }
 
 std::uint64_t* MapCollection::stage_clock() {
@@ -109,7 +114,8 @@ void MapCollection::step() {
   std::uint64_t* const spent = stage_clock();
   const std::uint64_t before = clock_.now_us != nullptr ? clock_.now_us(clock_.context) : 0;
   run_slice();
-  *spent += clock_.now_us != nullptr ? clock_.now_us(clock_.context) - before : 0;
+  const std::uint64_t after = clock_.now_us != nullptr ? clock_.now_us(clock_.context) : 0;
+  *spent += after >= before ? after - before : 0;
 }
 
 void MapCollection::run_slice() {

@@ -11,20 +11,35 @@ void MapCollection::begin_storing() {
   size.blob_bytes = static_cast<std::uint32_t>(config_.digest_bytes + kNodeRecordBytes +
                                                (odometry_edge_ == kNoId ? 0 : kEdgeRecordBytes));
   const SubmapId id = count_ - 1;
-  const Status status = store_->begin_group(size);
-  if (status == Status::ok && store_->put_submap(memory_.headers[id], slot_) == Status::ok) {
-    stage_ = Stage::store_submap;
-    return;
+  Status status = store_->begin_group(size);
+  if (status == Status::ok) {
+    status = store_->put_submap(memory_.headers[id], slot_);
   }
-  store_failed(status);
+  if (status == Status::ok) {
+    stage_ = Stage::store_submap;
+  } else {
+    store_failed(status);
+  }
 }
 
 void MapCollection::store_failed(Status status) {
   ++statistics_.not_stored;
+  statistics_.last_store_failure = status;
   log_.write(MELLIN_LOG_WARNING, LogLine() << "submap " << count_ - 1 << " is not stored: " << to_string(status));
   store_->abandon_group();
   begin_screening();
 }
+
+void MapCollection::flush_failed(Status status) {
+  ++statistics_.flushes_failed;
+  statistics_.last_store_failure = status;
+  log_.write(MELLIN_LOG_WARNING, LogLine() << "poses and edges are not stored: " << to_string(status));
+  store_->abandon_group();
+  stage_ = Stage::idle;
+}
+
+/// Records name stored submaps only: the id of one that was not stored may be another's after the next start.
+bool MapCollection::keeps(const Edge& edge) const { return store_->contains(edge.a) && store_->contains(edge.b); }
 
 void MapCollection::step_store() {
   const Status status = store_->step();
@@ -47,7 +62,7 @@ void MapCollection::step_store() {
       next = store_->put_blob(kNodeRecord, id, node_record(id));
       break;
     case Stage::store_node:
-      if (odometry_edge_ != kNoId) {
+      if (odometry_edge_ != kNoId && (!store_->keeps_data() || store_->contains(graph_.edge(odometry_edge_).a))) {
         stage_ = Stage::store_edge;
         next = store_->put_blob(kEdgeRecord, id, edge_record(odometry_edge_));
         break;
@@ -86,7 +101,7 @@ void MapCollection::begin_flush() {
   size.blob_bytes = static_cast<std::uint32_t>(count_ * kNodeRecordBytes + graph_.edge_count() * kEdgeRecordBytes);
   const Status status = store_->begin_group(size);
   if (status != Status::ok) {
-    log_.write(MELLIN_LOG_WARNING, LogLine() << "poses and edges are not stored: " << to_string(status));
+    flush_failed(status);
     return;
   }
   record_ = 0;
@@ -96,6 +111,12 @@ void MapCollection::begin_flush() {
 }
 
 void MapCollection::flush_next() {
+  while (record_ < count_ && !store_->contains(record_)) {
+    ++record_;
+  }
+  while (record_ >= count_ && record_ < count_ + graph_.edge_count() && !keeps(graph_.edge(record_ - count_))) {
+    ++record_;
+  }
   Status status = Status::ok;
   if (record_ < count_) {
     status = store_->put_blob(kNodeRecord, record_, node_record(record_));
@@ -109,8 +130,7 @@ void MapCollection::flush_next() {
   }
   ++record_;
   if (status != Status::ok) {
-    store_->abandon_group();
-    stage_ = Stage::idle;
+    flush_failed(status);
   }
 }
 
@@ -120,9 +140,7 @@ void MapCollection::step_flush() {
     return;
   }
   if (status != Status::ok) {
-    log_.write(MELLIN_LOG_WARNING, LogLine() << "poses and edges are not stored: " << to_string(status));
-    store_->abandon_group();
-    stage_ = Stage::idle;
+    flush_failed(status);
     return;
   }
   if (record_ > count_ + graph_.edge_count()) {
@@ -145,46 +163,122 @@ std::uint16_t MapCollection::session_index(const SessionId& id) {
   return session_count_++;
 }
 
+void MapCollection::restore_failed(Status status) {
+  restored_ = status;
+  log_.write(MELLIN_LOG_WARNING, LogLine() << "the store cannot be restored: " << to_string(status));
+  stage_ = Stage::idle;
+}
+
 void MapCollection::restore_submap() {
-  if (count_ >= store_->submap_count()) {
+  // Ids are given in order and nothing is ever forgotten: the submap of an id is the node of that number.
+  const std::size_t stored = store_->submap_count();
+  if (count_ >= config_.max_submaps || count_ > store_->submap_id(stored - 1)) {
     record_ = 0;
     stage_ = Stage::restore_edges;
     return;
   }
-  // Ids are given in order and nothing is ever forgotten, so that the i-th stored submap is the i-th node.
-  const SubmapId id = store_->submap_id(count_);
+  const SubmapId id = count_;
   const Result<SubmapHeader> header = store_->header(id);
   Pose2 pose;
   const Result<std::size_t> record = store_->read_blob(kNodeRecord, id, memory_.record);
-  const bool whole = id == count_ && count_ < config_.max_submaps && header.ok() && record.ok() &&
-                     read_node_record(memory_.record.first(record.value()), pose);
-  if (!whole || !graph_.add_node(pose).ok()) {
-    log_.write(MELLIN_LOG_WARNING, LogLine() << "the map ends before submap " << id << ", which is damaged");
-    record_ = 0;
-    stage_ = Stage::restore_edges;
+  if (header.status() == Status::device_error || record.status() == Status::device_error) {
+    restore_failed(Status::device_error);
+    return;
+  }
+  const bool whole = header.ok() && record.ok() && read_node_record(memory_.record.first(record.value()), pose);
+  if (!whole) {
+    restore_gap();
+    return;
+  }
+  const Result<NodeId> node = graph_.add_node(pose);
+  if (!node.ok()) {
+    restore_failed(node.status());
     return;
   }
   memory_.headers[id] = header.value();
   memory_.scans[id] = {session_index(header.value().session), header.value().first_scan, header.value().scan_count};
   ++count_;
   const Result<std::size_t> digest = store_->read_blob(kDigestRecord, id, memory_.record);
-  if (digest.ok() && digests_->begin_restore(id, memory_.record.first(digest.value())) == Status::ok) {
+  if (digest.status() == Status::device_error) {
+    restore_failed(Status::device_error);
+  } else if (digest.ok() && digests_->begin_restore(id, memory_.record.first(digest.value())) == Status::ok) {
     stage_ = Stage::restore_digest;
+  } else {
+    ++statistics_.records_damaged;
   }
+}
+
+/// The next id has no submap: the store refused it, or it is damaged. Its node stays empty, without digest, grid, scans
+/// and, mostly, edges, so that the ones behind it keep their ids.
+void MapCollection::restore_gap() {
+  const SubmapId id = count_;
+  log_.write(MELLIN_LOG_WARNING, LogLine() << "submap " << id << " is missing from the store");
+  SubmapHeader header = id > 0 ? memory_.headers[id - 1] : SubmapHeader{};
+  header.id = id;
+  header.scan_count = 0;
+  const Result<NodeId> node = graph_.add_node(id > 0 ? graph_.pose(id - 1) : Pose2{});
+  if (!node.ok()) {
+    restore_failed(node.status());
+    return;
+  }
+  memory_.headers[id] = header;
+  memory_.scans[id] = {id > 0 ? memory_.scans[id - 1].session : std::uint16_t{0}, header.first_scan, 0};
+  ++count_;
+  ++statistics_.submaps_missing;
+}
+
+/// Links the submaps of a session across what is missing between them: a submap, or an edge whose older end was not
+/// known to be stored. At most one visit of all edges for each submap, and mostly one visit in all.
+void MapCollection::bridge_gaps() {
+  std::uint32_t odometry_edges = 0;
+  for (EdgeId edge = 0; edge < graph_.edge_count(); ++edge) {
+    odometry_edges += graph_.edge(edge).kind == EdgeKind::odometry ? 1U : 0U;
+  }
+  if (odometry_edges + session_count_ >= count_) {
+    return;
+  }
+  SubmapId last = kNoSubmap;
+  bool whole = true;
+  for (SubmapId id = 0; id < count_; ++id) {
+    whole = whole && has_odometry_edge(id);
+    if (memory_.scans[id].count == 0) {
+      continue;
+    }
+    if (!whole && last != kNoSubmap && memory_.scans[last].session == memory_.scans[id].session) {
+      (void)add_odometry_edge(last, id, {});
+    }
+    last = id;
+    whole = true;
+  }
+}
+
+bool MapCollection::has_odometry_edge(SubmapId newer) const {
+  for (EdgeId edge = 0; edge < graph_.edge_count(); ++edge) {
+    if (graph_.edge(edge).kind == EdgeKind::odometry && graph_.edge(edge).b == newer) {
+      return true;
+    }
+  }
+  return false;
 }
 
 void MapCollection::restore_edge() {
   if (record_ >= store_->blob_count(kEdgeRecord)) {
+    bridge_gaps();
     record_ = 0;
     stage_ = Stage::restore_poses;
     return;
   }
   const std::uint32_t id = store_->blob_id(kEdgeRecord, record_++);
   const Result<std::size_t> record = store_->read_blob(kEdgeRecord, id, memory_.record);
+  if (record.status() == Status::device_error) {
+    restore_failed(Status::device_error);
+    return;
+  }
   Edge edge;
   if (!record.ok() || !read_edge_record(memory_.record.first(record.value()), edge) || edge.a >= count_ ||
       edge.b >= count_) {
     log_.write(MELLIN_LOG_WARNING, LogLine() << "edge " << id << " is damaged and left out");
+    ++statistics_.records_damaged;
     return;
   }
   const Result<EdgeId> added = graph_.add_edge(edge.a, edge.b, edge.kind, edge.a_T_b, edge.information);
@@ -202,7 +296,9 @@ void MapCollection::restore_pose() {
   const SubmapId id = record_++;
   const Result<std::size_t> record = store_->read_blob(kNodeRecord, id, memory_.record);
   Pose2 pose;
-  if (record.ok() && read_node_record(memory_.record.first(record.value()), pose)) {
+  if (record.status() == Status::device_error) {
+    restore_failed(Status::device_error);
+  } else if (record.ok() && read_node_record(memory_.record.first(record.value()), pose)) {
     (void)graph_.set_pose(id, pose);
   }
 }

@@ -73,9 +73,38 @@ bool ParticleMapper::within_reach(const Pose2& pose) {
   return magnitude(pose.x) < kReach_m && magnitude(pose.y) < kReach_m && magnitude(pose.theta) < kReach_m;
 }
 
-bool ParticleMapper::acceptable(const Scan& scan) const {
-  return scan.laser < kMaxLasers && lasers_[scan.laser].beams > 0 &&
-         scan.ranges_m.size() == lasers_[scan.laser].beams && within_reach(scan.odom_T_base);
+/// Whether it can be mapped; counts why not.
+bool ParticleMapper::acceptable(const Scan& scan) {
+  if (scan.laser >= kMaxLasers || lasers_[scan.laser].beams == 0) {
+    ++statistics_.unknown_laser;
+    return false;
+  }
+  if (scan.ranges_m.size() != lasers_[scan.laser].beams) {
+    ++statistics_.wrong_count;
+    return false;
+  }
+  const bool sane = within_reach(scan.odom_T_base);
+  statistics_.bad_odometry += sane ? 0U : 1U;
+  return sane;
+}
+
+/// What an accepted scan has that a working sensor and clock do not give.
+void ParticleMapper::count_oddities(const Scan& scan) {
+  if (scans_.end() > 0) {
+    statistics_.stamps_back += scan.stamp_us < last_stamp_us_ ? 1U : 0U;
+    statistics_.stamps_repeated += scan.stamp_us == last_stamp_us_ ? 1U : 0U;
+  }
+  last_stamp_us_ = scan.stamp_us;
+  bool bad = false;
+  for (const float range : scan.ranges_m) {
+    bad = bad || !(range >= 0.0F);
+  }
+  bool seen = false;
+  for (const StoredRange range : scans_.ranges(scans_.end())) {
+    seen = seen || range != 0;
+  }
+  statistics_.bad_ranges += bad ? 1U : 0U;
+  statistics_.blind += seen ? 0U : 1U;
 }
 
 Sym3 ParticleMapper::prior_information(const Pose2& motion) const {
@@ -101,10 +130,12 @@ Result<ScanOutcome> ParticleMapper::add(const Scan& scan) {
   const Pose2 predicted = compose(tracked_, motion);
   if (!within_reach(predicted)) {  // odometry that jumps adds up
     ++statistics_.refused;
+    ++statistics_.beyond_reach;
     return Status::bad_data;
   }
   last_odometry_ = scan.odom_T_base;
   scans_.stage(scan);
+  count_oddities(scan);
   (void)matcher_.set_scan(scans_.ranges(scans_.end()), scans_.directions(scans_.end()),
                           lasers_[scan.laser].base_T_laser, config_.cell_m);
 

@@ -1,5 +1,7 @@
 #include "mellin/config.hpp"
 
+#include "mellin/spectral/fft2.hpp"
+
 namespace mellin {
 namespace {
 
@@ -149,11 +151,12 @@ Status validate(const Config& given, Log log) {
   if (c.submaps.band_rows < 1) {
     return refuse(log, "band_rows", c.submaps.band_rows, "at least 1");
   }
-  if (c.screening_side < 16 || !halves_to(c.side, c.screening_side)) {
-    return refuse(log, "screening_side", c.screening_side, "side over a power of two, at least 16");
+  constexpr const char* kTransformed = "side over a power of two, even, 32 to 1024, a product of 2, 3 and 5";
+  if (!is_fft_side(c.screening_side) || !halves_to(c.side, c.screening_side)) {
+    return refuse(log, "screening_side", c.screening_side, kTransformed);
   }
-  if (c.registration_side < 16 || !halves_to(c.side, c.registration_side)) {
-    return refuse(log, "registration_side", c.registration_side, "side over a power of two, at least 16");
+  if (!is_fft_side(c.registration_side) || !halves_to(c.side, c.registration_side)) {
+    return refuse(log, "registration_side", c.registration_side, kTransformed);
   }
   if (c.class_side < 16 || c.side % c.class_side != 0) {
     return refuse(log, "class_side", c.class_side, "a divisor of side, at least 16");
@@ -163,6 +166,15 @@ Status validate(const Config& given, Log log) {
   }
   if (c.max_submaps < 2 || c.max_submaps > 65535) {
     return refuse(log, "max_submaps", c.max_submaps, "2 to 65535");
+  }
+  if (c.collection.graph.max_fill < c.max_submaps) {
+    return refuse(log, "max_fill", c.collection.graph.max_fill, "at least max_submaps");
+  }
+  if (c.collection.graph.work_per_step < 1) {
+    return refuse(log, "work_per_step", c.collection.graph.work_per_step, "at least 1");
+  }
+  if (validate(MapCollection::graph_config(c.collection)) != Status::ok) {
+    return refuse(log, "max_edges", c.collection.graph.max_edges, "at most 2^24, and max_fill at most 2^28");
   }
   if (c.max_sessions < 1) {
     return refuse(log, "max_sessions", c.max_sessions, "at least 1");

@@ -62,6 +62,9 @@ Status Slam::init(const Config& config, const Memory& memory, const mellin_port&
   while (!collection_.idle()) {
     collection_.step();  // restores what the store holds
   }
+  if (collection_.restored() != Status::ok) {
+    return collection_.restored();
+  }
   return collection_.begin_session(new_session_id());
 }
 
@@ -87,13 +90,19 @@ SessionId Slam::new_session_id() {
   return id;
 }
 
+void Slam::count_since(std::uint64_t before_us, std::uint64_t& spent_us) {
+  const std::uint64_t now = now_us();
+  spent_us += now >= before_us ? now - before_us : 0;
+  statistics_.clock_back += now < before_us ? 1U : 0U;
+}
+
 Result<ScanOutcome> Slam::add(const Scan& scan) {
   const std::uint64_t before = now_us();
   const Result<ScanOutcome> outcome = mapper_.add(scan);
   if (outcome.ok() && outcome.value().taken) {
     freeze_if_due(builder_.scan_taken(mapper_));
   }
-  statistics_.mapping_us += now_us() - before;
+  count_since(before, statistics_.mapping_us);
   return outcome;
 }
 
@@ -128,7 +137,7 @@ void Slam::render_slice() {
   } else {
     rendered_ = done.value();
   }
-  statistics_.rendering_us += now_us() - before;
+  count_since(before, statistics_.rendering_us);
 }
 
 void Slam::hand_over() {

@@ -39,11 +39,25 @@ Status FlashLog::init(const Memory& memory, const mellin_flash& flash, const Log
   appended_records_ = 0;
   appended_bytes_ = 0;
   statistics_ = {};
+  failures_ = {};
   return Status::ok;
 }
 
 Status FlashLog::read(std::uint32_t address, Span<std::uint8_t> out) const {
   const int result = flash_.read(flash_.context, address, out.data(), static_cast<std::uint32_t>(out.size()));
+  failures_.reads += result == 0 ? 0U : 1U;
+  return result == 0 ? Status::ok : Status::device_error;
+}
+
+Status FlashLog::erase(std::uint32_t block) {
+  const int result = flash_.erase(flash_.context, block);
+  failures_.erases += result == 0 ? 0U : 1U;
+  return result == 0 ? Status::ok : Status::device_error;
+}
+
+Status FlashLog::sync() {
+  const int result = flash_.sync(flash_.context);
+  failures_.syncs += result == 0 ? 0U : 1U;
   return result == 0 ? Status::ok : Status::device_error;
 }
 
@@ -61,7 +75,7 @@ Status FlashLog::format() {
   fill_ = 0;
   statistics_ = {};
   BlockHeader newest;
-  bool blank = true;
+  Blank blank;
   const Status found = find_newest(newest, blank);
   if (found == Status::device_error) {
     return found;
@@ -91,11 +105,12 @@ Status FlashLog::format() {
 
 Status FlashLog::erase_all() {
   for (std::uint32_t block = 0; block < flash_.block_count; ++block) {
-    if (flash_.erase(flash_.context, block) != 0) {
-      return Status::device_error;
+    const Status status = erase(block);
+    if (status != Status::ok) {
+      return status;
     }
   }
-  return flash_.sync(flash_.context) == 0 ? Status::ok : Status::device_error;
+  return sync();
 }
 
 Status FlashLog::mount() {
@@ -104,10 +119,10 @@ Status FlashLog::mount() {
   fill_ = 0;
   statistics_ = {};
   BlockHeader newest;
-  bool blank = true;
+  Blank blank;
   Status status = find_newest(newest, blank);
-  if (status == Status::bad_data && blank) {
-    return Status::not_found;
+  if (status == Status::bad_data && blank.others) {
+    return blank.first ? Status::not_found : find_torn_format();
   }
   if (status == Status::ok) {
     status = check_identity(newest);
@@ -123,9 +138,9 @@ Status FlashLog::mount() {
 }
 
 /// The block with the highest sequence, of whatever identity. Sets newest_block_ and sums up erases.
-Status FlashLog::find_newest(BlockHeader& newest, bool& blank) {
+Status FlashLog::find_newest(BlockHeader& newest, Blank& blank) {
   newest.sequence = 0;
-  blank = true;
+  blank = {};
   for (std::uint32_t block = 0; block < flash_.block_count; ++block) {
     std::uint8_t bytes[kBlockHeaderBytes];
     BlockHeader header;
@@ -134,7 +149,8 @@ Status FlashLog::find_newest(BlockHeader& newest, bool& blank) {
       return status;
     }
     for (const std::uint8_t byte : bytes) {
-      blank = blank && byte == flash_.erased_value;
+      bool& is_blank = block == 0 ? blank.first : blank.others;
+      is_blank = is_blank && byte == flash_.erased_value;
     }
     if (decode_block_header(bytes, header) != Status::ok) {
       continue;
@@ -149,6 +165,29 @@ Status FlashLog::find_newest(BlockHeader& newest, bool& blank) {
     }
   }
   return newest.sequence != 0 ? Status::ok : Status::bad_data;
+}
+
+/// Whether block 0 holds what a power cut may leave of the very first header: some of the bits that it programs, and
+/// nothing behind them. Nothing was ever stored there. Statuses: not_found: so it is; bad_data; device_error.
+Status FlashLog::find_torn_format() const {
+  std::uint8_t header[kBlockHeaderBytes];
+  encode_block_header(block_header(1, 1, 1), header);
+  std::uint8_t window[128];
+  for (std::uint32_t at = 0; at < flash_.block_size; at += static_cast<std::uint32_t>(sizeof window)) {
+    const Status status = read(at, window);
+    if (status != Status::ok) {
+      return status;
+    }
+    for (std::uint32_t i = 0; i < sizeof window; ++i) {
+      const std::uint8_t intended = at + i < sizeof header ? header[at + i] : flash_.erased_value;
+      const unsigned changed = window[i] ^ unsigned { flash_.erased_value };
+      const unsigned programmed = intended ^ unsigned { flash_.erased_value };
+      if ((changed & ~programmed) != 0) {
+        return Status::bad_data;
+      }
+    }
+  }
+  return Status::not_found;
 }
 
 Status FlashLog::check_identity(const BlockHeader& header) const {
@@ -228,11 +267,15 @@ Status FlashLog::open_block() {
       return status;
     }
   }
+  const std::uint32_t newest = newest_block_;
   Status status = Status::full;
   while (status != Status::ok && free_blocks() > 0 && newest_sequence_ + 1 < kNumberLimit) {
     const std::uint32_t block = after(newest_block_);
     newest_block_ = block;
     status = start_block(block, newest_sequence_ + 1);
+  }
+  if (status != Status::ok) {
+    newest_block_ = newest;  // it is the device rather than its blocks: they are tried again
   }
   return status;
 }
@@ -243,7 +286,7 @@ Status FlashLog::start_block(std::uint32_t block, std::uint32_t sequence) {
   const Status known = read_block_header(block, old);
   // The ring wears all blocks alike: where a torn erase took the count, the number of rounds stands in for it.
   const std::uint32_t erases = known == Status::ok ? old.erases + 1 : (sequence - 1) / flash_.block_count + 1;
-  if (flash_.erase(flash_.context, block) != 0) {
+  if (erase(block) != Status::ok) {
     log_.write(MELLIN_LOG_WARNING, LogLine() << "store: block " << block << " cannot be erased");
     return Status::device_error;
   }
@@ -258,20 +301,24 @@ Status FlashLog::start_block(std::uint32_t block, std::uint32_t sequence) {
   return write_block_header(erases);
 }
 
-Status FlashLog::write_block_header(std::uint32_t erases) {
+BlockHeader FlashLog::block_header(std::uint32_t sequence, std::uint32_t oldest_sequence, std::uint32_t erases) const {
   BlockHeader header;
   header.side = identity_.side;
   header.fingerprint = identity_.fingerprint;
-  header.sequence = newest_sequence_;
-  header.oldest_sequence = oldest_sequence_;
+  header.sequence = sequence;
+  header.oldest_sequence = oldest_sequence;
   header.erases = erases;
   header.block_size = flash_.block_size;
   header.block_count = flash_.block_count;
   header.program_unit = flash_.program_unit;
   header.cell_m = identity_.cell_m;
   header.erased_value = flash_.erased_value;
+  return header;
+}
+
+Status FlashLog::write_block_header(std::uint32_t erases) {
   std::uint8_t bytes[kBlockHeaderBytes];
-  encode_block_header(header, bytes);
+  encode_block_header(block_header(newest_sequence_, oldest_sequence_, erases), bytes);
   return put(bytes);
 }
 
@@ -330,6 +377,7 @@ Status FlashLog::program_page() {
   page_address_ += size;
   fill_ = 0;
   if (result != 0) {
+    ++failures_.programs;
     open_ = false;
     return Status::device_error;
   }
@@ -338,17 +386,12 @@ Status FlashLog::program_page() {
 }
 
 Status FlashLog::flush() {
-  if (open_) {
-    const Status status = program_page();
-    if (status != Status::ok) {
-      return status;
-    }
+  Status status = open_ ? program_page() : Status::ok;
+  if (status == Status::ok) {
+    status = sync();
+    open_ = open_ && status == Status::ok;
   }
-  if (flash_.sync(flash_.context) != 0) {
-    open_ = false;
-    return Status::device_error;
-  }
-  return Status::ok;
+  return status;
 }
 
 // Reading.
@@ -480,6 +523,7 @@ Status FlashLog::read_payload(const LogRecord& record, Span<std::uint8_t> out) c
 FlashLogStatistics FlashLog::statistics() const {
   FlashLogStatistics statistics = statistics_;
   statistics.free_blocks = free_blocks();
+  statistics.failures = failures_;
   return statistics;
 }
 

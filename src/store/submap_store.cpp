@@ -30,6 +30,7 @@ Status SubmapStore::init(const StoreConfig& config, const Memory& memory, const 
   fetch_slot_ = SlotHandle();
   fetch_id_ = kNoSubmap;
   lost_records_ = 0;
+  groups_failed_ = 0;
   if (!has_flash()) {
     log_sink_.write(MELLIN_LOG_INFO, LogLine() << "store: no flash, submaps are kept only in their slots");
     return Status::ok;
@@ -354,12 +355,14 @@ StoreStatistics SubmapStore::statistics() const {
   statistics.blobs = static_cast<std::uint32_t>(index_.size()) - statistics.submaps;
   statistics.logical_bytes = index_.bytes();
   statistics.lost_records = lost_records_;
+  statistics.groups_failed = groups_failed_;
   if (has_flash()) {
     const FlashLogStatistics log = log_.statistics();
     statistics.programmed_bytes = log.programmed_bytes;
     statistics.erases = log.erases;
     statistics.max_block_erases = log.max_block_erases;
     statistics.damaged_blocks = log.damaged_blocks;
+    statistics.flash_failures = log.failures;
     statistics.free_bytes = std::uint64_t{log.free_blocks} * log_.block_room() + log_.room();
   }
   return statistics;

@@ -199,6 +199,7 @@ Status SubmapStore::step() {
   }
   job_ = Job::none;
   if (status != Status::ok) {
+    ++groups_failed_;
     abandon_group();
   } else if (committing) {
     publish_slot();

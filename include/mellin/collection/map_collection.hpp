@@ -63,8 +63,12 @@ struct CollectionStatistics {
   std::uint64_t pairs_accepted = 0;  ///< became edges
   std::uint32_t edges_rejected = 0;  ///< were edges, and then outliers
   std::uint32_t fetches_failed = 0;
-  std::uint32_t stored = 0;      ///< submaps that are safe in the store
-  std::uint32_t not_stored = 0;  ///< submaps that the store refused
+  std::uint32_t stored = 0;          ///< submaps that are safe in the store
+  std::uint32_t not_stored = 0;      ///< submaps that the store refused: they stay in the map until the next start
+  std::uint32_t flushes_failed = 0;  ///< poses and edges not stored: the next flush does it all again
+  Status last_store_failure = Status::ok;  ///< why, of the last submap or flush that was not stored
+  std::uint32_t submaps_missing = 0;       ///< ids without a submap, found when the store was restored
+  std::uint32_t records_damaged = 0;       ///< digests, poses and edges left out when the store was restored
   std::uint32_t optimisations = 0;
   std::uint64_t screening_us = 0;  ///< by the port's clock
   std::uint64_t registration_us = 0;
@@ -128,6 +132,9 @@ class MapCollection {
 
   /// Whether step() has nothing to do.
   bool idle() const { return stage_ == Stage::idle; }
+  /// Whether the store could be read while it was restored: ok; device_error: the rest is missing from the map, and
+  /// nothing must be stored on top of it.
+  Status restored() const { return restored_; }
   /// Whether insert() can be called.
   bool ready() const { return stage_ == Stage::idle; }
   /// One slice of work; see the parts for their bounds.
@@ -179,6 +186,7 @@ class MapCollection {
 
   void run_slice();
   void link_odometry(SubmapId id, const Sym3& drift);
+  Result<EdgeId> add_odometry_edge(SubmapId a, SubmapId b, const Sym3& drift);
   void begin_screening();
   void screen_next();
   void finish_screening();
@@ -199,7 +207,13 @@ class MapCollection {
   void flush_next();
   void step_flush();
   std::uint16_t session_index(const SessionId& id);
+  void flush_failed(Status status);
+  bool keeps(const Edge& edge) const;
+  void restore_failed(Status status);
   void restore_submap();
+  void restore_gap();
+  void bridge_gaps();
+  bool has_odometry_edge(SubmapId newer) const;
   void restore_edge();
   void restore_pose();
 
@@ -233,6 +247,7 @@ class MapCollection {
   std::uint32_t record_ = 0;         ///< next to be flushed or restored
   std::uint32_t loops_flushed_ = 0;  ///< loop and merge edges among those that this flush has put
   EdgeId odometry_edge_ = kNoId;     ///< of the submap under way
+  Status restored_ = Status::ok;
 };
 
 }  // namespace mellin

@@ -22,7 +22,7 @@ struct LaserConfig {
 
 /// One scan with the odometry of its moment.
 struct Scan {
-  std::int64_t stamp_us = 0;
+  std::int64_t stamp_us = 0;   ///< kept with the submaps; results do not depend on it
   Span<const float> ranges_m;  ///< one a beam; NaN, infinite, negative or out of range: no measurement
   Pose2 odom_T_base;           ///< dead reckoning, in any fixed frame
   std::uint8_t laser = 0;      ///< index into Config::lasers

@@ -33,7 +33,15 @@ struct MapperStatistics {
   std::uint32_t scans = 0;  ///< given, refused ones included
   std::uint32_t taken = 0;
   std::uint32_t unmatched = 0;  ///< rode on odometry
-  std::uint32_t refused = 0;    ///< bad_data
+  std::uint32_t refused = 0;    ///< bad_data; the sum of the next four
+  std::uint32_t unknown_laser = 0;
+  std::uint32_t wrong_count = 0;   ///< of ranges
+  std::uint32_t bad_odometry = 0;  ///< not finite, or out of the mapper's reach by itself
+  std::uint32_t beyond_reach = 0;  ///< the odometry's jumps added up to a pose out of the mapper's reach
+  std::uint32_t bad_ranges = 0;   ///< accepted scans with a range that is NaN or negative: a beam that measured nothing
+  std::uint32_t blind = 0;        ///< accepted scans of which no beam measured anything
+  std::uint32_t stamps_back = 0;  ///< accepted scans stamped earlier than the one accepted before
+  std::uint32_t stamps_repeated = 0;  ///< accepted scans stamped as the one accepted before
   std::uint32_t resampled = 0;
 };
 
@@ -43,7 +51,9 @@ class LocalMapper {
   virtual void reset(const Pose2& session_T_base) = 0;
 
   /// Takes the next scan. bad_data: an odometry that is not finite or leads out of the mapper's reach, a laser that is
-  /// not configured, a wrong number of ranges; the scan is then ignored. Cost bounded by the configuration.
+  /// not configured, a wrong number of ranges; the scan is then ignored and counted. Scans count in the order in which
+  /// they are given: a stamp that jumps back, stands still or leaps ahead is kept as it is, counted, and changes
+  /// nothing. Cost bounded by the configuration.
   virtual Result<ScanOutcome> add(const Scan& scan) = 0;
 
   virtual Pose2 pose() const = 0;

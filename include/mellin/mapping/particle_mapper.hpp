@@ -113,7 +113,8 @@ class ParticleMapper final : public LocalMapper {
     return memory_.rects.subspan(particle * config_.remembered_scans, config_.remembered_scans);
   }
 
-  bool acceptable(const Scan& scan) const;
+  bool acceptable(const Scan& scan);
+  void count_oddities(const Scan& scan);
   Sym3 prior_information(const Pose2& motion) const;
   ScanUse track(const Pose2& predicted, const Sym3& prior);
   bool take(const Pose2& predicted, const Sym3& prior);
@@ -132,8 +133,9 @@ class ParticleMapper final : public LocalMapper {
   Pose2 motion_;   ///< by odometry, since the last taken scan
   Pose2 tracked_;  ///< live pose at the newest scan, taken or not
   Sym3 tracked_information_;
-  Pose2 last_odometry_;   ///< at the newest scan
-  Pose2 taken_odometry_;  ///< at the newest taken scan
+  std::int64_t last_stamp_us_ = 0;  ///< of the newest scan
+  Pose2 last_odometry_;             ///< at the newest scan
+  Pose2 taken_odometry_;            ///< at the newest taken scan
 };
 
 }  // namespace mellin

@@ -35,12 +35,21 @@ struct LogRecord {
   std::uint32_t bytes() const { return static_cast<std::uint32_t>(kRecordHeaderBytes) + header.length; }
 };
 
+/// Calls that the device refused, since init.
+struct FlashFailures {
+  std::uint32_t reads = 0;
+  std::uint32_t programs = 0;
+  std::uint32_t erases = 0;
+  std::uint32_t syncs = 0;
+};
+
 struct FlashLogStatistics {
   std::uint64_t programmed_bytes = 0;  ///< since init
   std::uint64_t erases = 0;            ///< over the device's life, as the block headers tell
   std::uint32_t max_block_erases = 0;  ///< the same, of the most erased block
   std::uint32_t damaged_blocks = 0;    ///< blocks among the live ones whose header is invalid
   std::uint32_t free_blocks = 0;
+  FlashFailures failures;
 };
 
 class FlashLog {
@@ -63,9 +72,9 @@ class FlashLog {
   /// Starts an empty log behind whatever is there: one erase and one program. A power cut leaves either the new log or
   /// the old one, less its oldest block where all were in use. Statuses: ok; device_error.
   Status format();
-  /// Finds the log's ends: reads one header a block. Statuses: ok; not_found on a blank device; bad_data where nothing
-  /// on it is a block header; version_mismatch where the log belongs to another format version, geometry or identity
-  /// (both are logged); device_error.
+  /// Finds the log's ends: reads one header a block. Statuses: ok; not_found on a blank device, also where a power
+  /// cut tore its first format(); bad_data where nothing on it is a block header; version_mismatch where the log
+  /// belongs to another format version, geometry or identity (both are logged); device_error.
   Status mount();
   bool mounted() const { return mounted_; }
   void unmount() { mounted_ = open_ = false; }
@@ -119,7 +128,16 @@ class FlashLog {
   Status search_record(std::uint32_t block, std::uint32_t from, LogRecord& out) const;
   Status enter_next_block(LogCursor& cursor) const;
   bool live(const BlockHeader& header) const;
-  Status find_newest(BlockHeader& newest, bool& blank);
+  /// Whether the places of block headers hold erased bytes only.
+  struct Blank {
+    bool first = true;  ///< block 0
+    bool others = true;
+  };
+  Status find_newest(BlockHeader& newest, Blank& blank);
+  Status find_torn_format() const;
+  Status erase(std::uint32_t block);
+  Status sync();
+  BlockHeader block_header(std::uint32_t sequence, std::uint32_t oldest_sequence, std::uint32_t erases) const;
   Status find_oldest();
   Status check_identity(const BlockHeader& header) const;
   Status erase_all();
@@ -144,6 +162,7 @@ class FlashLog {
   std::uint32_t appended_records_ = 0;
   std::uint32_t appended_bytes_ = 0;
   FlashLogStatistics statistics_;
+  mutable FlashFailures failures_;  ///< reading is const and may fail
 };
 
 }  // namespace mellin

@@ -59,6 +59,8 @@ struct StoreStatistics {
   std::uint64_t free_bytes = 0;        ///< in blocks that can still be opened
   std::uint32_t lost_records = 0;      ///< found missing or damaged since mount
   std::uint32_t damaged_blocks = 0;
+  std::uint32_t groups_failed = 0;  ///< given up in step(), since init
+  FlashFailures flash_failures;     ///< calls that the device refused, since init
 };
 
 class SubmapStore {
@@ -93,9 +95,10 @@ class SubmapStore {
   /// erase, one program. Statuses: ok; busy while a group is open; device_error.
   Status format();
   /// Finds what the flash holds: reads each block's record headers once or twice. Statuses: ok; not_found on a blank
-  /// device: format() it; bad_data where the device holds something else; version_mismatch where it was written by
-  /// another format version or configuration (logged with both); full where it holds more than max_submaps or
-  /// max_blobs; busy while a group is open; device_error. Where it is not ok, the store is empty and takes nothing.
+  /// device, or one whose first format() a power cut tore: format() it; bad_data where the device holds something else;
+  /// version_mismatch where it was written by another format version or configuration (logged with both); full where it
+  /// holds more than max_submaps or max_blobs; busy while a group is open; device_error. Where it is not ok, the store
+  /// is empty and takes nothing.
   Status mount();
   bool mounted() const { return !has_flash() || log_.mounted(); }
   /// Whether there is flash at all.
@@ -227,6 +230,7 @@ class SubmapStore {
   SubmapId fetch_id_ = kNoSubmap;
   std::uint32_t fetch_address_ = 0;
   std::uint32_t lost_records_ = 0;
+  std::uint32_t groups_failed_ = 0;
 };
 
 }  // namespace mellin
