@@ -1,13 +1,15 @@
 #!/usr/bin/env bash
 # Installs what is missing of the Debian 12 packages in the sets named; says nothing and touches nothing when all are
 # there. Runs as root, or as a user with sudo.
-# usage: tools/packages.sh SET…   sets: build (library, program, benchmarks), source (to fetch KissFFT), test (checks)
+# usage: tools/packages.sh SET…   sets: build (library, program, benchmarks), source (to fetch KissFFT), test (checks), target
+#                                         (cross compilers and emulators)
 set -euo pipefail
 
 declare -A sets=(
   [build]="cmake ninja-build g++ libeigen3-dev doctest-dev libcli11-dev nlohmann-json3-dev libpng-dev zlib1g-dev libfftw3-dev libbenchmark-dev python3"
   [source]="ca-certificates dpkg-dev xz-utils"
   [test]="binutils clang clang-tidy clang-format"
+  [target]="gcc-arm-none-eabi libnewlib-arm-none-eabi libstdc++-arm-none-eabi-newlib gcc-riscv64-unknown-elf picolibc-riscv64-unknown-elf g++-aarch64-linux-gnu g++-arm-linux-gnueabihf qemu-system-arm qemu-system-misc qemu-user"
 )
 
 wanted=()
