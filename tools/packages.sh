@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Installs what is missing of the Debian 12 packages in the sets named; says nothing and touches nothing when all are
 # there. Runs as root, or as a user with sudo.
-# usage: tools/packages.sh SET…   sets: build (library, program, benchmarks), source (to fetch KissFFT), test (checks), target
-#                                         (cross compilers and emulators)
+# usage: tools/packages.sh SET…   sets: build (library, program, benchmarks), source (to fetch KissFFT), test (checks),
+#                                 target (cross compilers and emulators)
 set -euo pipefail
 
 declare -A sets=(
