@@ -20,6 +20,8 @@ const char* to_string(LinkReason reason) {
       return "rejected by the robust optimisation";
     case LinkReason::forgotten:
       return "dropped for lack of room";
+    case LinkReason::redundant:
+      return "the graph knows as much without it";
   }
   return "unknown";
 }
@@ -60,6 +62,8 @@ struct Linker::Query {
 };
 
 namespace {
+
+constexpr double kLn2 = 0.69314718055994530942;
 
 /// Of the covariance of the position.
 double larger_eigenvalue(const Sym3& covariance) {
@@ -105,12 +109,27 @@ bool Linker::known_well(const Sym3& covariance) const {
   return covariance.xx <= m * m && covariance.yy <= m * m && covariance.tt <= rad * rad;
 }
 
+/// Whether an edge with this covariance would tell too little of a pose that the graph knows with that one.
+bool Linker::redundant(const Sym3& measured, const Sym3& in_map) const {
+  if (config_.min_gain_bits <= 0.0F) {
+    return false;
+  }
+  const Sym3 of_edge = scale(measured, 1.0 / static_cast<double>(config_.information_share));
+  const double bits = static_cast<double>(config_.min_gain_bits);
+  return determinant(of_edge + in_map) < exp(2.0 * bits * kLn2) * determinant(of_edge);
+}
+
+/// Each node that may still come needs room for its odometry edge.
+bool Linker::has_room(const PoseGraph& graph) {
+  return graph.edge_capacity() - graph.edge_count() > graph.node_capacity() - graph.node_count();
+}
+
 std::size_t Linker::decide(PoseGraph& graph, Optimiser& optimiser, Span<const NodeScans> scans, void* context,
                            Decided decided) {
   Query query{&graph, &optimiser, scans};
   std::uint64_t alone = 0;     // suffice alone
   std::uint64_t eligible = 0;  // may be in a set
-  for (std::size_t i = 0; i < pending_.size(); ++i) {
+  for (std::size_t i = 0; i < pending_.size();) {
     PendingLink& link = pending_[i];
     const LoopHypothesis& h = link.hypothesis;
     const std::uint64_t bit = std::uint64_t{1} << i;
@@ -123,12 +142,19 @@ std::size_t Linker::decide(PoseGraph& graph, Optimiser& optimiser, Span<const No
       link.graph_chi2 = hypothesis_chi2(h.measured, in_map);
       const bool fits = link.graph_chi2 <= config_.graph_gate_chi2;
       link.reason = fits ? LinkReason::waiting : LinkReason::contradicts_map;
+      if (fits && redundant(h.measured.covariance, in_map.covariance)) {
+        link.reason = LinkReason::redundant;
+        decided(context, link, kNoId);
+        pending_.erase(i);
+        continue;
+      }
       eligible |= fits ? bit : 0;
       alone |= fits && known_well(in_map.covariance) && link.agreement >= config_.single_agreement ? bit : 0;
     }
     if (link.reason != before) {
       decided(context, link, kNoId);
     }
+    ++i;
   }
   if (alone != 0) {
     return accept(graph, scans, alone, LinkReason::confirmed_by_map, context, decided);
@@ -187,12 +213,15 @@ std::size_t Linker::accept(PoseGraph& graph, Span<const NodeScans> scans, std::u
     PendingLink link = pending_[i];
     const LoopHypothesis& h = link.hypothesis;
     Sym3 information;
+    if (!has_room(graph)) {
+      continue;  // the hypothesis keeps waiting
+    }
     if (information_from_covariance(h.measured.a_T_b, h.measured.covariance, information)) {
       const EdgeKind kind = scans[h.a].session == scans[h.b].session ? EdgeKind::loop : EdgeKind::merge;
       const Result<EdgeId> edge = graph.add_edge(h.a, h.b, kind, h.measured.a_T_b,
                                                  scale(information, static_cast<double>(config_.information_share)));
       if (!edge.ok()) {
-        continue;  // the graph is full: the hypothesis keeps waiting
+        continue;
       }
       link.reason = reason;
       decided(context, link, edge.value());

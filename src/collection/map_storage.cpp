@@ -167,6 +167,9 @@ void MapCollection::restore_submap() {
   memory_.headers[id] = header.value();
   memory_.scans[id] = {session_index(header.value().session), header.value().first_scan, header.value().scan_count};
   ++count_;
+  if (!digests_->holds_digests()) {
+    return;  // it is read when it is compared
+  }
   const Result<std::size_t> digest = store_->read_blob(kDigestRecord, id, memory_.record);
   if (digest.ok() && digests_->begin_restore(id, memory_.record.first(digest.value())) == Status::ok) {
     stage_ = Stage::restore_digest;

@@ -88,6 +88,7 @@ Status validate_numbers(const Config& c, const Log& log) {
       {"max_drift_m", c.submaps.max_drift_m, 0.0F, kMuch, true, not_negative},
       {"max_drift_rad", c.submaps.max_drift_rad, 0.0F, kMuch, true, not_negative},
       {"drift_share", c.submaps.drift_share, 0.0F, 1.0F, true, "0 to 1"},
+      {"min_gain_bits", c.collection.linker.min_gain_bits, 0.0F, 20.0F, true, "0 to 20"},
       {"base_m", edge.base_m, 1e-5F, kMuch, false, "at least 0.00001"},
       {"per_m", edge.per_m, 0.0F, kMuch, true, not_negative},
       {"base_rad", edge.base_rad, 1e-5F, kMuch, false, "at least 0.00001"},
@@ -166,6 +167,9 @@ Status validate(const Config& given, Log log) {
   }
   if (c.max_sessions < 1) {
     return refuse(log, "max_sessions", c.max_sessions, "at least 1");
+  }
+  if (c.screening.cache_features && !c.screening.hold_digests) {
+    return refuse(log, "cache_features", 1.0, "0 where hold_digests is 0");
   }
   if (c.collection.linker.pending < 1 || c.collection.linker.pending > kMaxHypotheses) {
     return refuse(log, "pending", c.collection.linker.pending, "1 to 64");

@@ -41,6 +41,10 @@ struct LinkerConfig {
   /// Neighbouring submaps share most of their scans, so their edges repeat one another: each carries this share of its
   /// information.
   float information_share = 0.25F;
+  /// An edge is added only where it tells the graph at least so much, in bits: one half log2 of how much smaller it
+  /// makes the covariance (Ila, Porta, Andrade-Cetto 2010). Over 0, edges and fill stay few where the robot passes the
+  /// same places again and again.
+  float min_gain_bits = 0.0F;
 };
 
 /// Why a hypothesis became an edge, or did not.
@@ -53,6 +57,7 @@ enum class LinkReason : std::uint8_t {
   confirmed_by_set,  ///< accepted: enough independent witnesses agree
   outlier,           ///< was accepted, and later rejected by the robust optimisation
   forgotten,         ///< dropped while waiting, for lack of room
+  redundant,         ///< the graph knows as much without it
 };
 const char* to_string(LinkReason reason);
 
@@ -103,6 +108,8 @@ class Linker {
  private:
   struct Query;
   bool known_well(const Sym3& covariance) const;
+  bool redundant(const Sym3& measured, const Sym3& in_map) const;
+  static bool has_room(const PoseGraph& graph);
   std::uint64_t confirmed(const PoseGraph& graph, Query& query, std::size_t index, std::uint64_t eligible);
   std::size_t accept(PoseGraph& graph, Span<const NodeScans> scans, std::uint64_t members, LinkReason reason,
                      void* context, Decided decided);

@@ -63,6 +63,7 @@ struct CollectionStatistics {
   std::uint64_t pairs_accepted = 0;  ///< became edges
   std::uint32_t edges_rejected = 0;  ///< were edges, and then outliers
   std::uint32_t fetches_failed = 0;
+  std::uint32_t digests_missed = 0;  ///< could not be read back when they were to be compared
   std::uint32_t stored = 0;      ///< submaps that are safe in the store
   std::uint32_t not_stored = 0;  ///< submaps that the store refused
   std::uint32_t optimisations = 0;
@@ -95,6 +96,12 @@ class MapCollection {
   }
   template <class A>
   static constexpr Memory carve(A& arena, const CollectionConfig& config) {
+    return carve(arena, arena, config);
+  }
+  /// The optimiser's memory comes from `work`. The collection uses it from the last registration of a submap to the end
+  /// of that submap's work; the matchers may use it at all other times.
+  template <class A, class W>
+  static constexpr Memory carve(A& arena, W& work, const CollectionConfig& config) {
     Memory m;
     m.headers = arena.template take<SubmapHeader>(config.max_submaps, Part::collection);
     m.scans = arena.template take<NodeScans>(config.max_submaps, Part::collection);
@@ -102,7 +109,7 @@ class MapCollection {
     m.candidates = arena.template take<Candidate>(config.max_submaps, Part::collection);
     m.linker = Linker::carve(arena, config.linker);
     m.graph = PoseGraph::carve(arena, graph_config(config));
-    m.optimiser = Optimiser::carve(arena, graph_config(config));
+    m.optimiser = Optimiser::carve(work, graph_config(config));
     m.record = arena.template take<std::uint8_t>(
         config.digest_bytes > kRecordBytes ? config.digest_bytes : kRecordBytes, Part::collection);
     return m;
@@ -167,6 +174,7 @@ class MapCollection {
     store_edge,
     commit,
     screen,
+    recalling,
     screening,
     choose,
     fetching,
@@ -181,6 +189,8 @@ class MapCollection {
   void link_odometry(SubmapId id, const Sym3& drift);
   void begin_screening();
   void screen_next();
+  void recall_digest();
+  void begin_comparison();
   void finish_screening();
   void choose_candidate();
   void step_fetch();
