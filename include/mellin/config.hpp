@@ -130,15 +130,17 @@ constexpr Config nano_profile() {
   c.cell_m = 0.16F;
   c.registration_side = 40;
   c.class_side = 80;
-  c.max_submaps = 160;
+  c.max_submaps = 150;
   c.max_sessions = 4;
   c.mapper.spare_scans = 4;
+  c.mapper.count_once_a_scan = true;
   c.submaps.band_rows = 4;
   c.screening.hold_digests = false;
   c.registration.alignment.max_points = 512;
   c.registration.alignment.final_m = 0.2F;  // over the width of a cell, below which points do not lie still
-  c.collection.graph.max_edges = 320;
-  c.collection.graph.max_fill = 512;
+  c.collection.graph.max_edges = 360;
+  c.collection.graph.max_fill = 760;
+  c.collection.linker.min_gain_bits = 1.5F;
   c.collection.linker.pending = 16;
   return c;
 }

@@ -63,7 +63,37 @@ struct Linker::Query {
 
 namespace {
 
+/// What an edge must tell grows by this many times as the graph fills …
+constexpr double kDemandGrowth = 3.0;
+/// … and beyond this share of the room is so many times what it was at first: that room is for the loop that closes
+/// late and mends much.
+constexpr double kReserveFrom = 0.9;
+constexpr double kReserveDemand = 8.0;
 constexpr double kLn2 = 0.69314718055994530942;
+
+/// Each node that may still come needs room for its odometry edge.
+bool has_room(const PoseGraph& graph) {
+  return graph.edge_capacity() - graph.edge_count() > graph.node_capacity() - graph.node_count();
+}
+
+double share(double used, double of) { return of > 0.0 ? used / of : 1.0; }
+
+/// Share of the room for loop and merge edges that is taken, in the list of edges or in the factor, whichever is more.
+/// What odometry edges take, a block of fill each among it, is theirs.
+double room_taken(const PoseGraph& graph, const Optimiser& optimiser) {
+  const double nodes = graph.node_count();
+  const double node_room = graph.node_capacity();
+  const double edges = share(graph.edge_count() - nodes, graph.edge_capacity() - node_room);
+  const double fill = share(optimiser.report().fill - nodes, optimiser.fill_capacity() - node_room);
+  return edges > fill ? edges : fill;
+}
+
+double demand(double taken) { return taken > kReserveFrom ? kReserveDemand : 1.0 + kDemandGrowth * taken; }
+
+/// Whether an edge with this covariance would tell less than `bits` of a pose that the graph knows with that one.
+bool tells_too_little(const Sym3& of_edge, const Sym3& in_map, double bits) {
+  return determinant(of_edge + in_map) < exp(2.0 * kLn2 * bits) * determinant(of_edge);
+}
 
 /// Of the covariance of the position.
 double larger_eigenvalue(const Sym3& covariance) {
@@ -109,24 +139,10 @@ bool Linker::known_well(const Sym3& covariance) const {
   return covariance.xx <= m * m && covariance.yy <= m * m && covariance.tt <= rad * rad;
 }
 
-/// Whether an edge with this covariance would tell too little of a pose that the graph knows with that one.
-bool Linker::redundant(const Sym3& measured, const Sym3& in_map) const {
-  if (config_.min_gain_bits <= 0.0F) {
-    return false;
-  }
-  const Sym3 of_edge = scale(measured, 1.0 / static_cast<double>(config_.information_share));
-  const double bits = static_cast<double>(config_.min_gain_bits);
-  return determinant(of_edge + in_map) < exp(2.0 * bits * kLn2) * determinant(of_edge);
-}
-
-/// Each node that may still come needs room for its odometry edge.
-bool Linker::has_room(const PoseGraph& graph) {
-  return graph.edge_capacity() - graph.edge_count() > graph.node_capacity() - graph.node_count();
-}
-
 std::size_t Linker::decide(PoseGraph& graph, Optimiser& optimiser, Span<const NodeScans> scans, void* context,
                            Decided decided) {
   Query query{&graph, &optimiser, scans};
+  const double min_gain_bits = static_cast<double>(config_.min_gain_bits) * demand(room_taken(graph, optimiser));
   std::uint64_t alone = 0;     // suffice alone
   std::uint64_t eligible = 0;  // may be in a set
   for (std::size_t i = 0; i < pending_.size();) {
@@ -142,7 +158,8 @@ std::size_t Linker::decide(PoseGraph& graph, Optimiser& optimiser, Span<const No
       link.graph_chi2 = hypothesis_chi2(h.measured, in_map);
       const bool fits = link.graph_chi2 <= config_.graph_gate_chi2;
       link.reason = fits ? LinkReason::waiting : LinkReason::contradicts_map;
-      if (fits && redundant(h.measured.covariance, in_map.covariance)) {
+      const Sym3 of_edge = scale(h.measured.covariance, 1.0 / static_cast<double>(config_.information_share));
+      if (fits && min_gain_bits > 0.0 && tells_too_little(of_edge, in_map.covariance, min_gain_bits)) {
         link.reason = LinkReason::redundant;
         decided(context, link, kNoId);
         pending_.erase(i);

@@ -127,6 +127,9 @@ Status validate(const Config& given, Log log) {
   if (c.remembered_scans < 2) {
     return refuse(log, "remembered_scans", c.remembered_scans, "at least 2");
   }
+  if (c.mapper.count_once_a_scan && c.remembered_scans > kMaxSmallCellCount) {
+    return refuse(log, "remembered_scans", c.remembered_scans, "at most 255 where they are counted once a scan");
+  }
   if (std::uint64_t{c.mapper.max_beams} * c.remembered_scans > kMaxCellCount) {
     return refuse(log, "remembered_scans x beams", static_cast<double>(c.mapper.max_beams) * c.remembered_scans,
                   "at most 65535, what a cell can count");

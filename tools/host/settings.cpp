@@ -24,6 +24,7 @@ void visit_settings(C& c, Visit&& visit) {
   visit("grid_slots", c.grid_slots);
   visit("seed", c.seed);
   visit("mapper.particles", c.mapper.particles);
+  visit("mapper.count_once_a_scan", c.mapper.count_once_a_scan);
   visit("mapper.spare_scans", c.mapper.spare_scans);
   visit("mapper.take_distance_m", c.mapper.take_distance_m);
   visit("mapper.take_angle_rad", c.mapper.take_angle_rad);

@@ -42,8 +42,9 @@ struct LinkerConfig {
   /// information.
   float information_share = 0.25F;
   /// An edge is added only where it tells the graph at least so much, in bits: one half log2 of how much smaller it
-  /// makes the covariance (Ila, Porta, Andrade-Cetto 2010). Over 0, edges and fill stay few where the robot passes the
-  /// same places again and again.
+  /// makes the covariance (Ila, Porta, Andrade-Cetto 2010). Several times as much as the room for edges and for the
+  /// factor's fill runs out. Over 0, passing the same places again and again does not use up the graph, and there
+  /// is room left for the loop that closes late.
   float min_gain_bits = 0.0F;
 };
 
@@ -108,8 +109,6 @@ class Linker {
  private:
   struct Query;
   bool known_well(const Sym3& covariance) const;
-  bool redundant(const Sym3& measured, const Sym3& in_map) const;
-  static bool has_room(const PoseGraph& graph);
   std::uint64_t confirmed(const PoseGraph& graph, Query& query, std::size_t index, std::uint64_t eligible);
   std::size_t accept(PoseGraph& graph, Span<const NodeScans> scans, std::uint64_t members, LinkReason reason,
                      void* context, Decided decided);
