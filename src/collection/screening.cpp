@@ -31,8 +31,7 @@ Status SpectralScreening::init(const ScreeningConfig& config, const Memory& memo
     return Status::invalid_config;
   }
   const std::size_t held = config.hold_digests ? config.max_submaps : 2;
-  if (memory.scratch.size() < scratch_size(config) ||
-      memory.digests.size() < held * digest_size(config.matcher.side)) {
+  if (memory.scratch.size() < scratch_size(config) || memory.digests.size() < held * digest_size(config.matcher.side)) {
     return Status::insufficient_memory;
   }
   return matcher_.init(config.matcher, memory.matcher);

@@ -16,7 +16,8 @@ constexpr double kConvergedXy = 1e-3;     // m
 constexpr double kConvergedTheta = 2e-4;  // rad
 constexpr std::uint32_t kFewestInliers = 30;
 constexpr float kNormalWindow_m = 0.3F;  // half side of the window that a wall's direction is taken from …
-constexpr float kFewestCellsInWindow = 2.0F;  // … and in cells: a window of 3 x 3 holds three cells of a thin wall, too few
+constexpr float kFewestCellsInWindow =
+    2.0F;  // … and in cells: a window of 3 x 3 holds three cells of a thin wall, too few
 constexpr float kMostCellsInWindow = 16.0F;
 constexpr float kStraightness = 0.1F;  // largest ratio of the scatter across to the scatter along a wall
 constexpr float kFewestInWindow = 4.0F;
@@ -283,7 +284,8 @@ void Alignment::collect_points() {
   const GridView& grid = from_->grid;
   const int end = slice_end();
   const std::uint32_t wanted = std::min<std::uint32_t>(from_->obstacles, config_.max_points);
-  const int reach = static_cast<int>(std::clamp(kNormalWindow_m / grid.cell_m, kFewestCellsInWindow, kMostCellsInWindow));
+  const int reach =
+      static_cast<int>(std::clamp(kNormalWindow_m / grid.cell_m, kFewestCellsInWindow, kMostCellsInWindow));
   const float half = 0.5F * static_cast<float>(grid.side);
   for (int row = row_; row < end; ++row) {
     const std::uint8_t* const cells = grid.cells.data() + static_cast<std::ptrdiff_t>(row) * grid.side;

@@ -64,8 +64,8 @@ struct CollectionStatistics {
   std::uint32_t edges_rejected = 0;  ///< were edges, and then outliers
   std::uint32_t fetches_failed = 0;
   std::uint32_t digests_missed = 0;  ///< could not be read back when they were to be compared
-  std::uint32_t stored = 0;      ///< submaps that are safe in the store
-  std::uint32_t not_stored = 0;  ///< submaps that the store refused
+  std::uint32_t stored = 0;          ///< submaps that are safe in the store
+  std::uint32_t not_stored = 0;      ///< submaps that the store refused
   std::uint32_t optimisations = 0;
   std::uint64_t screening_us = 0;  ///< by the port's clock
   std::uint64_t registration_us = 0;

@@ -86,7 +86,8 @@ class MeasureArena {
     return Span<T>(nullptr, count);
   }
   constexpr Workspace take_workspace(const ArenaUse& largest) {
-    return {take<std::byte>(largest.bulk, Part::workspace), take<std::byte>(largest.fast, Part::workspace, Region::fast)};
+    return {take<std::byte>(largest.bulk, Part::workspace),
+            take<std::byte>(largest.fast, Part::workspace, Region::fast)};
   }
   /// An arena for one of those who take turns. What it measures is not counted again.
   constexpr MeasureArena over(const Workspace& /*workspace*/) const { return {}; }
@@ -128,7 +129,8 @@ class Arena {
     return Span<T>(typed, count);
   }
   Workspace take_workspace(const ArenaUse& largest) {
-    return {take<std::byte>(largest.bulk, Part::workspace), take<std::byte>(largest.fast, Part::workspace, Region::fast)};
+    return {take<std::byte>(largest.bulk, Part::workspace),
+            take<std::byte>(largest.fast, Part::workspace, Region::fast)};
   }
   /// An arena for one of those who take turns.
   Arena over(const Workspace& workspace) const { return Arena(workspace.bulk, workspace.fast); }
