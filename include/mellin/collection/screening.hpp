@@ -21,7 +21,7 @@ struct ScreeningConfig {
   /// Keeps each digest in RAM, 1.25 bytes x side^2 each; without, two of them (the newest submap's, and the one that it
   /// is compared with), and the others are read from the store whenever they are compared, so that there has to be one.
   bool hold_digests = true;
-  /// Keeps each digest's features (spectra) in RAM too, some 12 bytes x side^2 each; without, those of the older submap
+  /// Keeps each digest's features (spectra) in RAM too, some 10 bytes x side^2 each; without, those of the older submap
   /// are made again for each comparison.
   bool cache_features = true;
 };
