@@ -16,8 +16,7 @@ constexpr double kConvergedXy = 1e-3;     // m
 constexpr double kConvergedTheta = 2e-4;  // rad
 constexpr std::uint32_t kFewestInliers = 30;
 constexpr float kNormalWindow_m = 0.3F;  // half side of the window that a wall's direction is taken from …
-constexpr float kFewestCellsInWindow =
-    2.0F;  // … and in cells: a window of 3 x 3 holds three cells of a thin wall, too few
+constexpr float kFewestCellsInWindow = 2.0F;  // … and in cells: 3 x 3 hold three of a thin wall, too few
 constexpr float kMostCellsInWindow = 16.0F;
 constexpr float kStraightness = 0.1F;  // largest ratio of the scatter across to the scatter along a wall
 constexpr float kFewestInWindow = 4.0F;
