@@ -148,6 +148,31 @@ TEST_CASE("a corridor fixes the pose across it and the heading, and says nothing
   CHECK(stiff_along >= 0.0);
 }
 
+TEST_CASE("walls a single wide cell thick hold the pose across themselves, and only there") {
+  constexpr std::uint16_t kSide = 160;
+  constexpr float kCell = 0.16F;
+  for (const bool room : {true, false}) {
+    CAPTURE(room);
+    // Two walls along x, 9 m apart; in a room two along y as well.
+    std::vector<std::uint8_t> cells(std::size_t{kSide} * kSide, std::uint8_t{0});
+    for (std::size_t i = 50; i <= 106; ++i) {
+      cells[50 * kSide + i] = cells[106 * kSide + i] = 254;
+      if (room) {
+        cells[i * kSide + 50] = cells[i * kSide + 106] = 254;
+      }
+    }
+    AlignmentConfig config;
+    config.final_m = 0.2F;
+    Bench bench(config);
+    const GridView grid{{cells.data(), cells.size()}, kSide, kCell};
+    const Result<AlignmentResult> result = bench.align(grid, grid, {0.02, 0.03, 0.002});
+    REQUIRE(result.ok());
+    // Known to 0.1 m across walls; along them only where there are others.
+    CHECK(result.value().information.yy > 1.0 / (0.1 * 0.1));
+    CHECK((result.value().information.xx > 1.0 / (0.1 * 0.1)) == room);
+  }
+}
+
 TEST_CASE("alignment does not depend on the size of its slices") {
   const std::vector<host::PosedScan> scans = test::simulated_scans(3);
   const host::RenderedSubmap a = test::submap(scans, 0, 20, 2, 0.4);

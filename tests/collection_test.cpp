@@ -40,23 +40,32 @@ class FakeDigests final : public DigestMatcher {
   std::vector<Pair> compared;
   std::vector<std::uint8_t> digests = std::vector<std::uint8_t>(4 * 256);
   int restored = 0;
+  bool holds_all = true;
 
   Status begin_describe(std::uint32_t index, const GridView& grid) override {
+    forget_others(index);
     for (std::size_t i = 0; i < 4; ++i) {
       digests[4 * index + i] = static_cast<std::uint8_t>(grid.cells[0] + i);
     }
+    described_ = index;
     return start();
   }
   Status begin_restore(std::uint32_t index, Span<const std::uint8_t> digest) override {
     if (digest.size() != 4) {
       return Status::invalid_argument;
     }
+    forget_others(described_);
     std::copy(digest.begin(), digest.end(), digests.begin() + 4 * index);
     ++restored;
     return start();
   }
   Status begin_compare(std::uint32_t a, std::uint32_t b) override {
     compared.emplace_back(a, b);
+    for (const std::uint32_t index : {a, b}) {
+      for (std::size_t i = 0; i < 4; ++i) {
+        CHECK(digests[4 * index + i] == index + i);  // both are there, and they are the right ones
+      }
+    }
     hypotheses_.clear();
     if (agreement(a, b) > 0.0F) {
       (void)hypotheses_.push(place(between(true_pose(a), true_pose(b)), agreement(a, b)));
@@ -66,12 +75,21 @@ class FakeDigests final : public DigestMatcher {
   bool step() override { return --steps_ == 0; }
   const PlaceHypotheses& hypotheses() const override { return hypotheses_; }
   Span<const std::uint8_t> digest_bytes(std::uint32_t index) const override { return {digests.data() + 4 * index, 4}; }
+  bool holds_digests() const override { return holds_all; }
 
  private:
+  void forget_others(std::uint32_t kept) {
+    for (std::uint32_t index = 0; !holds_all && index < 256; ++index) {
+      if (index != kept) {
+        std::fill_n(digests.begin() + 4 * index, 4, std::uint8_t{0xEE});
+      }
+    }
+  }
   Status start() {
     steps_ = 3;
     return Status::ok;
   }
+  std::uint32_t described_ = 0;
   int steps_ = 0;
   PlaceHypotheses hypotheses_;
 };
@@ -112,7 +130,10 @@ struct Bench {
   std::vector<PairEvent> events;
 
   /// Mounts what the flash holds, or formats it.
-  explicit Bench(const mellin_flash& flash, CollectionConfig wanted = {}, std::uint16_t slots = 2) : config(wanted) {
+  explicit Bench(const mellin_flash& flash, CollectionConfig wanted = {}, std::uint16_t slots = 2,
+                 bool hold_digests = true)
+      : config(wanted) {
+    digests.holds_all = hold_digests;
     config.max_submaps = 40;
     config.max_sessions = 6;
     config.digest_bytes = 4;
@@ -363,6 +384,53 @@ TEST_CASE("a restart finds submaps, digests, sessions and edges again, also afte
       CHECK(fourth.map.map_T_submap(id).theta == poses[id].theta);
     }
   }
+}
+
+TEST_CASE("digests that are not held are read back before they are compared, also after a restart") {
+  port::HeapFlash flash({4096, 256, 256});
+  CollectionConfig config;
+  const auto some_alike = [](std::uint32_t a, std::uint32_t b) { return (a + b) % 3 == 0 ? 0.9F : 0.0F; };
+  port::HeapFlash other({4096, 256, 256});
+  Bench held(other.flash());
+  held.digests.agreement = some_alike;
+  held.session(1);
+  {
+    Bench paged(flash.flash(), config, 2, false);
+    paged.digests.agreement = some_alike;
+    paged.session(1);
+    for (std::uint32_t i = 0; i < 12; ++i) {
+      held.insert(10 * i);
+      paged.insert(10 * i);
+    }
+    CHECK(paged.digests.compared == held.digests.compared);
+    CHECK(paged.digests.restored == static_cast<int>(held.digests.compared.size()));
+    CHECK(paged.grids.registered == held.grids.registered);
+    CHECK(paged.edges(EdgeKind::loop) == held.edges(EdgeKind::loop));
+    CHECK(paged.edges(EdgeKind::loop) > 0);
+    CHECK(paged.map.statistics().digests_missed == 0);
+  }
+  Bench again(flash.flash(), config, 2, false);
+  REQUIRE(again.map.size() == 12);
+  CHECK(again.digests.restored == 0);  // not before they are wanted
+  again.session(2);
+  again.insert(0);
+  CHECK(again.digests.compared.size() == 12);
+  CHECK(again.map.statistics().digests_missed == 0);
+}
+
+TEST_CASE("digests that the flash does not hold are passed over and counted") {
+  port::HeapFlash flash({4096, 10, 256});
+  Bench bench(flash.flash(), {}, 2, false);
+  bench.session(1);
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    bench.insert(40 * i);
+  }
+  const CollectionStatistics& statistics = bench.map.statistics();
+  REQUIRE(statistics.not_stored > 1);
+  CHECK(statistics.pairs_possible == 40 * 39 / 2);
+  // Those that were not stored are the last ones: a pair is missed where the older of the two is among them.
+  CHECK(statistics.digests_missed == statistics.not_stored * (statistics.not_stored - 1) / 2);
+  CHECK(statistics.pairs_screened + statistics.digests_missed == statistics.pairs_possible);
 }
 
 TEST_CASE("a full flash loses what does not fit, says so, and the map goes on in RAM") {

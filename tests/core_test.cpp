@@ -115,6 +115,32 @@ TEST_CASE("arena: what is measured is what is used, and one byte less is refused
   CHECK(split.ok());
 }
 
+TEST_CASE("arena: those who take turns in a workspace start at its beginning, and the largest decides its size") {
+  const auto one = [](auto& arena) { return arena.template take<double>(5, Part::graph); };
+  const auto other = [](auto& arena) {
+    (void)arena.template take<std::uint8_t>(8, Part::spectral, Region::fast);
+    return arena.template take<std::uint32_t>(3, Part::spectral);
+  };
+  const ArenaUse largest = larger(measured(one), measured(other));
+  CHECK(largest.bulk == 40);
+  CHECK(largest.fast == 8);
+  MeasureArena measure;
+  MeasureArena turn = measure.over(measure.take_workspace(largest));
+  CHECK(one(turn).size() == 5);
+  CHECK(measure.use().total() == 48);
+  CHECK(measure.use().by_part[static_cast<int>(Part::workspace)] == 48);
+  alignas(kArenaAlignment) std::byte memory[48];
+  Arena arena{Span<std::byte>(memory, 48)};
+  const Workspace workspace = arena.take_workspace(largest);
+  CHECK(arena.ok());
+  Arena first = arena.over(workspace);
+  Arena second = arena.over(workspace);
+  CHECK(static_cast<void*>(one(first).data()) == static_cast<void*>(memory));
+  CHECK(static_cast<void*>(other(second).data()) == static_cast<void*>(memory));
+  CHECK(first.ok());
+  CHECK(second.ok());
+}
+
 TEST_CASE("ring: first in, first out across the seam") {
   int memory[3] = {};
   Ring<int> ring{Span<int>(memory)};

@@ -24,13 +24,14 @@ struct Verdict {
 
 /// A chain of submaps along x, 5 m apart, with odometry of a given deviation; further components behind it.
 struct Bench {
-  GraphRig rig{PoseGraphConfig{}};
+  GraphRig rig;
   std::vector<NodeScans> scans;
   std::vector<PendingLink> memory;
   Linker linker;
   std::vector<Verdict> verdicts;
 
-  explicit Bench(const LinkerConfig& config = {}) : memory(config.pending) {
+  explicit Bench(const LinkerConfig& config = {}, const PoseGraphConfig& graph = {})
+      : rig(graph), memory(config.pending) {
     linker = Linker(config, {{memory.data(), memory.size()}});
   }
   /// A session of `count` submaps, each of 40 scans, `new_scans` of them new.
@@ -183,6 +184,46 @@ TEST_CASE("sessions are merged by three witnesses, not by two") {
     merges += bench.rig.graph.edge(id).kind == EdgeKind::merge ? 1U : 0U;
   }
   CHECK(merges == 3);
+}
+
+TEST_CASE("where edges have to tell something, what the graph knows already is dropped") {
+  LinkerConfig config;
+  config.min_gain_bits = 1.5F;
+  // Deviations along x and y of the edge with its share of information: 2 sqrt(0.01^2 + 0.04^2) = 0.082 m.
+  Bench sure(config);
+  sure.session(4, 0.02, 0.002);  // two steps of 0.02 m: less than a tenth of a bit
+  sure.hypothesis(0, 2, {10.0, 0.0, 0.0});
+  CHECK(sure.decide() == 0);
+  REQUIRE(sure.verdicts.size() == 1);
+  CHECK(sure.verdicts[0].reason == LinkReason::redundant);
+  CHECK(sure.linker.pending() == 0);
+  Bench vague(config);
+  vague.session(4, 0.2, 0.02);  // two of 0.2 m: log2(sqrt(1 + 0.28^2 / 0.082^2)) = 1.8 bits along x alone
+  vague.hypothesis(0, 2, {10.0, 0.0, 0.0});
+  CHECK(vague.decide() == 1);
+  CHECK(vague.verdicts.back().reason == LinkReason::confirmed_by_map);
+  Bench undemanding;  // by default nothing is dropped
+  undemanding.session(4, 0.02, 0.002);
+  undemanding.hypothesis(0, 2, {10.0, 0.0, 0.0});
+  CHECK(undemanding.decide() == 1);
+}
+
+TEST_CASE("loop edges leave room for the odometry edges of the submaps to come") {
+  PoseGraphConfig graph;
+  graph.max_nodes = 6;
+  graph.max_edges = 7;
+  graph.max_fill = 20;
+  Bench bench({}, graph);
+  bench.session(5, 0.2, 0.02);  // four odometry edges, and one to come: two are left
+  for (NodeId b = 2; b < 5; ++b) {
+    bench.hypothesis(0, b, {5.0 * b, 0.0, 0.0});
+  }
+  CHECK(bench.decide() == 2);
+  CHECK(bench.linker.pending() == 1);
+  CHECK(bench.decide() == 0);
+  CHECK(bench.linker.pending() == 1);
+  const NodeId last = bench.rig.graph.add_node({25.0, 0.0, 0.0}).value();
+  CHECK(bench.rig.graph.add_edge(4, last, EdgeKind::odometry, {5.0, 0.0, 0.0}, diagonal(1.0, 1.0, 1.0)).ok());
 }
 
 TEST_CASE("what is no evidence is not kept; where there is no room the worst is dropped") {

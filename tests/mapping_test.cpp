@@ -63,7 +63,7 @@ struct Bench {
     lasers.all[0].base_T_laser = mount;
     const ScanMemoryConfig scan_config{32, beams};
     scans = ScanMemory(scan_config, memory_scans.give<ScanMemory>(scan_config), lasers.span());
-    grid = LiveGrid({cells.data(), cells.size()}, {field.data(), field.size()}, kSide, cell_m);
+    grid = LiveGrid({{{cells.data(), cells.size()}, {}}, {field.data(), field.size()}, {}}, 0, kSide, cell_m);
     grid.reset({});
     config.max_points = beams;
     matcher = ScanMatcher(config, memory_matcher.give<ScanMatcher>(config));

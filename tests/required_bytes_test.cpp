@@ -55,6 +55,8 @@ Config random_config(std::uint64_t number) {
   c.submaps.every_scans = 3;
   c.submaps.band_rows = pick<std::uint16_t>(random, {1, 7, 32, 500});
   c.screening.cache_features = random.uniform() < 0.5;
+  c.screening.hold_digests = c.screening.cache_features || random.uniform() < 0.5;
+  c.mapper.count_once_a_scan = random.uniform() < 0.5;
   c.registration.alignment.max_points = pick<std::uint16_t>(random, {64, 333, 1024});
   c.registration.alignment.keep_both = random.uniform() < 0.5;
   c.collection.linker.pending = pick<std::uint16_t>(random, {1, 5, 64});

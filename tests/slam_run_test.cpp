@@ -173,10 +173,29 @@ TEST_CASE("the same input gives the same bits, however the work is sliced; anoth
   CHECK_FALSE(same_bits(sampled, run(config, fewer, 64)));
 }
 
+TEST_CASE("digests give the same map from flash as from RAM") {
+  Config config = nano_profile();
+  (void)host::add_lasers(config, drive().log);
+  REQUIRE_FALSE(config.screening.hold_digests);
+  const std::size_t scans = kSanitized ? 250 : 2000;
+  const Record paged = run(config, scans, 64);
+  config.screening.hold_digests = true;
+  CHECK(same_bits(paged, run(config, scans, 64)));
+  config.screening.cache_features = true;
+  CHECK(same_bits(paged, run(config, scans, 64)));
+  CHECK(paged.submaps.size() > 2);
+  CHECK((kSanitized || paged.edges.size() >= paged.submaps.size()));  // with loops among them
+}
+
 TEST_CASE("a robot restarted over its flash finds its whole map and goes on from it") {
   port::HeapFlash flash({});
   const host::Log& log = drive().log;
-  const Config config = config_for(log);
+  Config config = config_for(log);
+  SUBCASE("with digests in RAM") { REQUIRE(config.screening.hold_digests); }
+  SUBCASE("with digests in flash") {
+    config = nano_profile();
+    (void)host::add_lasers(config, log);
+  }
   std::vector<Pose2> submaps;
   std::vector<SubmapHeader> headers;
   std::vector<Edge> edges;

@@ -21,6 +21,32 @@ namespace {
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 }  // namespace
 
+TEST_CASE("the small profiles keep to the sizes that they are made for, and hold a large building") {
+  constexpr auto bytes_of = [](Config config) {
+    config.lasers[0].beams = 180;
+    return required_bytes(config);
+  };
+  static_assert(bytes_of(nano_profile()) <= 384 * 1024);
+  static_assert(bytes_of(micro_profile()) <= 2048 * 1024);
+  static_assert(nano_profile().max_submaps >= 144);
+  static_assert(micro_profile().max_submaps >= 160);
+  // At least one loop edge for every second submap, beside the odometry edges.
+  constexpr PoseGraphConfig graph = nano_profile().collection.graph;
+  static_assert(graph.max_edges >= nano_profile().max_submaps * 3 / 2);
+}
+
+TEST_CASE("digests that are not held need a flash to be read from") {
+  const Config config = with_laser(nano_profile());
+  REQUIRE_FALSE(config.screening.hold_digests);
+  std::vector<std::string> lines;
+  mellin_port port = {};
+  port.log = sink_to(lines);
+  GuardedMemory memory(required_bytes(config));
+  CHECK(Slam::create(config, memory.span(), port).status() == Status::invalid_config);
+  REQUIRE(lines.size() == 1);
+  CHECK(lines[0].find("hold_digests") != std::string::npos);
+}
+
 TEST_CASE("validate() refuses each field out of its range and names it") {
   struct Bad {
     const char* field;
@@ -46,6 +72,11 @@ TEST_CASE("validate() refuses each field out of its range and names it") {
       {"side", [](Config& c) { c.side = 4096; }},
       {"remembered_scans", [](Config& c) { c.remembered_scans = 1; }},
       {"remembered_scans x beams", [](Config& c) { c.remembered_scans = 400; }},
+      {"remembered_scans",
+       [](Config& c) {
+         c.mapper.count_once_a_scan = true;
+         c.remembered_scans = 256;
+       }},
       {"particles", [](Config& c) { c.mapper.particles = 0; }},
       {"spare_scans", [](Config& c) { c.mapper.spare_scans = 0; }},
       {"spare_scans", [](Config& c) { c.mapper.spare_scans = 65530; }},
@@ -88,6 +119,12 @@ TEST_CASE("validate() refuses each field out of its range and names it") {
       {"work_per_step", [](Config& c) { c.collection.graph.work_per_step = 0; }},
       {"max_sessions", [](Config& c) { c.max_sessions = 0; }},
       {"pending", [](Config& c) { c.collection.linker.pending = 65; }},
+      {"cache_features",
+       [](Config& c) {
+         c.screening.cache_features = true;
+         c.screening.hold_digests = false;
+       }},
+      {"min_gain_bits", [](Config& c) { c.collection.linker.min_gain_bits = kNaN; }},
       {"base_m", [](Config& c) { c.collection.odometry.base_m = 0.0F; }},
       {"base_rad", [](Config& c) { c.collection.odometry.base_rad = kNaN; }},
   };

@@ -110,7 +110,7 @@ constexpr Config micro_profile() {
   c.screening_side = 40;
   c.registration_side = 80;
   c.class_side = 160;
-  c.max_submaps = 144;
+  c.max_submaps = 160;
   c.grid_slots = 2;
   c.mapper.spare_scans = 8;
   c.submaps.band_rows = 16;
@@ -123,20 +123,24 @@ constexpr Config micro_profile() {
   return c;
 }
 
-/// For a board with a few hundred kilobytes (Cortex-M4F, M33): 160 x 160 cells of 20 cm.
+/// For a board with a few hundred kilobytes (Cortex-M4F, M33): 160 x 160 cells of 16 cm. Digests stay in flash.
 constexpr Config nano_profile() {
   Config c = micro_profile();
   c.side = 160;
-  c.cell_m = 0.2F;
+  c.cell_m = 0.16F;
   c.registration_side = 40;
   c.class_side = 80;
-  c.max_submaps = 24;
+  c.max_submaps = 150;
   c.max_sessions = 4;
   c.mapper.spare_scans = 4;
-  c.submaps.band_rows = 8;
+  c.mapper.count_once_a_scan = true;
+  c.submaps.band_rows = 4;
+  c.screening.hold_digests = false;
   c.registration.alignment.max_points = 512;
-  c.collection.graph.max_edges = 96;
-  c.collection.graph.max_fill = 128;
+  c.registration.alignment.final_m = 0.2F;  // over the width of a cell, below which points do not lie still
+  c.collection.graph.max_edges = 360;
+  c.collection.graph.max_fill = 760;
+  c.collection.linker.min_gain_bits = 1.5F;
   c.collection.linker.pending = 16;
   return c;
 }

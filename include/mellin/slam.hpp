@@ -44,7 +44,6 @@ class Slam {
     SpectralScreening::Memory screening;
     SpectralRegistration::Memory registration;
     MapCollection::Memory collection;
-    Span<float> scratch;
   };
   /// Requires a resolved configuration.
   template <class A>
@@ -53,7 +52,8 @@ class Slam {
   /// Builds the system in `memory` (aligned to kArenaAlignment, required_bytes(config) long; it stays the caller's, and
   /// the system lives as long). `fast` may hold what required_memory(config).fast says, and memory the rest. What the
   /// port's flash holds is restored before this returns; a blank flash is formatted. A first session begins.
-  /// Statuses: ok; invalid_config (the log says which field); invalid_argument where memory is not aligned;
+  /// Statuses: ok; invalid_config (the log says which field; also digests that are not held, and
+  /// no flash to read them from); invalid_argument where memory is not aligned;
   /// insufficient_memory (the log says how many bytes lack); full where the flash holds submaps of max_sessions
   /// sessions already; version_mismatch, bad_data, device_error of the store: the flash is left as it was.
   static Result<Slam*> create(const Config& given, Span<std::byte> memory, const mellin_port& port,
@@ -141,12 +141,20 @@ constexpr Slam::Memory Slam::carve(A& arena, const Config& config) {
   m.mapper = ParticleMapper::carve(arena, config.mapper);
   m.builder = SubmapBuilder::carve(arena, config.submaps);
   m.store = SubmapStore::carve(arena, store_config(config));
-  m.screening = SpectralScreening::carve(arena, config.screening);
-  m.registration = SpectralRegistration::carve(arena, config.registration);
-  m.collection = MapCollection::carve(arena, config.collection);
-  const std::size_t screening = SpectralScreening::scratch_size(config.screening);
-  const std::size_t registration = SpectralRegistration::scratch_size(config.registration);
-  m.scratch = arena.template take<float>(screening > registration ? screening : registration, Part::spectral);
+  // A new submap is screened, then registered, then the graph is optimised: they take turns in one workspace.
+  const auto screen = [&](auto& kept, auto& work) { return SpectralScreening::carve(kept, work, config.screening); };
+  const auto match = [&](auto& kept, auto& work) {
+    return SpectralRegistration::carve(kept, work, config.registration);
+  };
+  const auto collect = [&](auto& kept, auto& work) { return MapCollection::carve(kept, work, config.collection); };
+  const Workspace workspace =
+      arena.take_workspace(larger(measured_work(screen), larger(measured_work(match), measured_work(collect))));
+  A for_screening = arena.over(workspace);
+  m.screening = screen(arena, for_screening);
+  A for_registration = arena.over(workspace);
+  m.registration = match(arena, for_registration);
+  A for_collection = arena.over(workspace);
+  m.collection = collect(arena, for_collection);
   return m;
 }
 

@@ -20,6 +20,8 @@ const char* to_string(LinkReason reason) {
       return "rejected by the robust optimisation";
     case LinkReason::forgotten:
       return "dropped for lack of room";
+    case LinkReason::redundant:
+      return "the graph knows as much without it";
   }
   return "unknown";
 }
@@ -60,6 +62,38 @@ struct Linker::Query {
 };
 
 namespace {
+
+/// What an edge must tell grows by this many times as the graph fills …
+constexpr double kDemandGrowth = 3.0;
+/// … and beyond this share of the room is so many times what it was at first: that room is for the loop that closes
+/// late and mends much.
+constexpr double kReserveFrom = 0.9;
+constexpr double kReserveDemand = 8.0;
+constexpr double kLn2 = 0.69314718055994530942;
+
+/// Each node that may still come needs room for its odometry edge.
+bool has_room(const PoseGraph& graph) {
+  return graph.edge_capacity() - graph.edge_count() > graph.node_capacity() - graph.node_count();
+}
+
+double share(double used, double of) { return of > 0.0 ? used / of : 1.0; }
+
+/// Share of the room for loop and merge edges that is taken, in the list of edges or in the factor, whichever is more.
+/// What odometry edges take, a block of fill each among it, is theirs.
+double room_taken(const PoseGraph& graph, const Optimiser& optimiser) {
+  const double nodes = graph.node_count();
+  const double node_room = graph.node_capacity();
+  const double edges = share(graph.edge_count() - nodes, graph.edge_capacity() - node_room);
+  const double fill = share(optimiser.report().fill - nodes, optimiser.fill_capacity() - node_room);
+  return edges > fill ? edges : fill;
+}
+
+double demand(double taken) { return taken > kReserveFrom ? kReserveDemand : 1.0 + kDemandGrowth * taken; }
+
+/// Whether an edge with this covariance would tell less than `bits` of a pose that the graph knows with that one.
+bool tells_too_little(const Sym3& of_edge, const Sym3& in_map, double bits) {
+  return determinant(of_edge + in_map) < exp(2.0 * kLn2 * bits) * determinant(of_edge);
+}
 
 /// Of the covariance of the position.
 double larger_eigenvalue(const Sym3& covariance) {
@@ -108,9 +142,10 @@ bool Linker::known_well(const Sym3& covariance) const {
 std::size_t Linker::decide(PoseGraph& graph, Optimiser& optimiser, Span<const NodeScans> scans, void* context,
                            Decided decided) {
   Query query{&graph, &optimiser, scans};
+  const double min_gain_bits = static_cast<double>(config_.min_gain_bits) * demand(room_taken(graph, optimiser));
   std::uint64_t alone = 0;     // suffice alone
   std::uint64_t eligible = 0;  // may be in a set
-  for (std::size_t i = 0; i < pending_.size(); ++i) {
+  for (std::size_t i = 0; i < pending_.size();) {
     PendingLink& link = pending_[i];
     const LoopHypothesis& h = link.hypothesis;
     const std::uint64_t bit = std::uint64_t{1} << i;
@@ -123,12 +158,20 @@ std::size_t Linker::decide(PoseGraph& graph, Optimiser& optimiser, Span<const No
       link.graph_chi2 = hypothesis_chi2(h.measured, in_map);
       const bool fits = link.graph_chi2 <= config_.graph_gate_chi2;
       link.reason = fits ? LinkReason::waiting : LinkReason::contradicts_map;
+      const Sym3 of_edge = scale(h.measured.covariance, 1.0 / static_cast<double>(config_.information_share));
+      if (fits && min_gain_bits > 0.0 && tells_too_little(of_edge, in_map.covariance, min_gain_bits)) {
+        link.reason = LinkReason::redundant;
+        decided(context, link, kNoId);
+        pending_.erase(i);
+        continue;
+      }
       eligible |= fits ? bit : 0;
       alone |= fits && known_well(in_map.covariance) && link.agreement >= config_.single_agreement ? bit : 0;
     }
     if (link.reason != before) {
       decided(context, link, kNoId);
     }
+    ++i;
   }
   if (alone != 0) {
     return accept(graph, scans, alone, LinkReason::confirmed_by_map, context, decided);
@@ -187,12 +230,15 @@ std::size_t Linker::accept(PoseGraph& graph, Span<const NodeScans> scans, std::u
     PendingLink link = pending_[i];
     const LoopHypothesis& h = link.hypothesis;
     Sym3 information;
+    if (!has_room(graph)) {
+      continue;  // the hypothesis keeps waiting
+    }
     if (information_from_covariance(h.measured.a_T_b, h.measured.covariance, information)) {
       const EdgeKind kind = scans[h.a].session == scans[h.b].session ? EdgeKind::loop : EdgeKind::merge;
       const Result<EdgeId> edge = graph.add_edge(h.a, h.b, kind, h.measured.a_T_b,
                                                  scale(information, static_cast<double>(config_.information_share)));
       if (!edge.ok()) {
-        continue;  // the graph is full: the hypothesis keeps waiting
+        continue;
       }
       link.reason = reason;
       decided(context, link, edge.value());

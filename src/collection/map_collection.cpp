@@ -93,6 +93,7 @@ std::uint64_t* MapCollection::stage_clock() {
   switch (stage_) {
     case Stage::describe:
     case Stage::screen:
+    case Stage::recalling:
     case Stage::screening:
       return &statistics_.screening_us;
     case Stage::choose:
@@ -151,6 +152,11 @@ void MapCollection::run_slice() {
     case Stage::screen:
       screen_next();
       break;
+    case Stage::recalling:
+      if (digests_->step()) {
+        begin_comparison();
+      }
+      break;
     case Stage::screening:
       if (digests_->step()) {
         finish_screening();
@@ -208,10 +214,30 @@ void MapCollection::screen_next() {
     return;
   }
   ++statistics_.pairs_possible;
-  if (digests_->begin_compare(other_, newest) == Status::ok) {
+  if (digests_->holds_digests()) {
+    begin_comparison();
+  } else {
+    recall_digest();
+  }
+}
+
+/// Reads the digest of the other submap back from the store.
+void MapCollection::recall_digest() {
+  const Result<std::size_t> size = store_->read_blob(kDigestRecord, other_, memory_.record);
+  if (size.ok() && digests_->begin_restore(other_, memory_.record.first(size.value())) == Status::ok) {
+    stage_ = Stage::recalling;
+    return;
+  }
+  ++statistics_.digests_missed;
+  ++other_;
+}
+
+void MapCollection::begin_comparison() {
+  if (digests_->begin_compare(other_, count_ - 1) == Status::ok) {
     stage_ = Stage::screening;
   } else {
     ++other_;
+    stage_ = Stage::screen;
   }
 }
 

@@ -18,15 +18,14 @@ bool same_place(const Pose2& p, const Pose2& q) {
 
 }  // namespace
 
-Status SpectralRegistration::init(const RegistrationConfig& config, const Memory& memory, Span<float> scratch) {
+Status SpectralRegistration::init(const RegistrationConfig& config, const Memory& memory) {
   config_ = config;
   memory_ = memory;
-  scratch_ = scratch;
   if (config.aligned < 1 || config.aligned > kMaxPlaceHypotheses || config.class_side == 0 ||
       config.grid_side % config.class_side != 0 || !(config.aligned_share >= 0.0F) || !(config.aligned_share <= 1.0F)) {
     return Status::invalid_config;
   }
-  if (scratch.size() < scratch_size(config)) {
+  if (memory.scratch.size() < scratch_size(config)) {
     return Status::insufficient_memory;
   }
   const Status matcher = matcher_.init(config.matcher, memory.matcher);
@@ -55,7 +54,7 @@ Status SpectralRegistration::begin(const GridView& a) {
 }
 
 bool SpectralRegistration::begin_picture(const GridView& grid, Stage stage) {
-  stage_ = maker_.begin(grid, scratch_, memory_.picture) == Status::ok ? stage : Stage::idle;
+  stage_ = maker_.begin(grid, memory_.scratch, memory_.picture) == Status::ok ? stage : Stage::idle;
   return stage_ != Stage::idle;
 }
 

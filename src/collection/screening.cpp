@@ -18,27 +18,35 @@ void insert_by_agreement(PlaceHypotheses& list, const PlaceHypothesis& hypothesi
   list.insert(at, hypothesis);
 }
 
-Status SpectralScreening::init(const ScreeningConfig& config, const Memory& memory, Span<float> scratch) {
+Status SpectralScreening::init(const ScreeningConfig& config, const Memory& memory) {
   config_ = config;
   memory_ = memory;
-  scratch_ = scratch;
+  features_a_ = memory.features_a;
+  features_b_ = memory.features_b;
   std::uint32_t side = config.grid_side;
   while (side > config.matcher.side && side % 2 == 0) {
     side /= 2;
   }
-  if (side != config.matcher.side || config.max_submaps == 0) {
+  if (side != config.matcher.side || config.max_submaps == 0 || (config.cache_features && !config.hold_digests)) {
     return Status::invalid_config;
   }
-  if (scratch.size() < scratch_size(config)) {
+  const std::size_t held = config.hold_digests ? config.max_submaps : 2;
+  if (memory.scratch.size() < scratch_size(config) || memory.digests.size() < held * digest_size(config.matcher.side)) {
     return Status::insufficient_memory;
   }
   return matcher_.init(config.matcher, memory.matcher);
 }
 
+bool SpectralScreening::holds(std::uint32_t index) const {
+  return index < config_.max_submaps && (config_.hold_digests || index == described_ || index == restored_);
+}
+
+/// Requires holds(index).
 DigestOut SpectralScreening::digest_out(std::uint32_t index) const {
   const std::uint16_t side = config_.matcher.side;
   const std::size_t pixels = std::size_t{side} * side;
-  const Span<std::uint8_t> bytes = memory_.digests.subspan(index * digest_size(side), digest_size(side));
+  const std::size_t place = config_.hold_digests ? index : (index == described_ ? 1 : 0);
+  const Span<std::uint8_t> bytes = memory_.digests.subspan(place * digest_size(side), digest_size(side));
   DigestOut out;
   out.obstacles = bytes.first(pixels);
   out.observed = bytes.subspan(pixels, mask_bytes(side));
@@ -48,16 +56,15 @@ DigestOut SpectralScreening::digest_out(std::uint32_t index) const {
 }
 
 Span<const std::uint8_t> SpectralScreening::digest_bytes(std::uint32_t index) const {
-  const std::size_t size = digest_size(config_.matcher.side);
-  return memory_.digests.subspan(index * size, size);
+  if (!holds(index)) {
+    return {};
+  }
+  return {digest_out(index).obstacles.data(), digest_size(config_.matcher.side)};
 }
 
-DigestView SpectralScreening::digest(std::uint32_t index) const {
-  return digest_out(index).view(config_.matcher.pixel_m);
-}
-
-Features SpectralScreening::features(std::size_t slot) const {
+Features SpectralScreening::cached_features(std::uint32_t index) const {
   const std::uint16_t side = config_.matcher.side;
+  const std::size_t slot = index;
   Features f;
   f.image = memory_.images.subspan(slot * Features::image_count(side), Features::image_count(side));
   f.filter = memory_.filters.subspan(slot * Features::filter_count(side), Features::filter_count(side));
@@ -67,39 +74,44 @@ Features SpectralScreening::features(std::size_t slot) const {
   return f;
 }
 
-void SpectralScreening::begin_features(std::uint32_t index, std::size_t slot, Stage stage) {
-  working_ = features(slot);
-  working_.ready = false;
-  stage_ = matcher_.begin_extract(digest_out(index).obstacles, working_) == Status::ok ? stage : Stage::idle;
+void SpectralScreening::begin_features(std::uint32_t index, Features& out, Stage stage) {
+  stage_ = matcher_.begin_extract(digest_out(index).obstacles, out) == Status::ok ? stage : Stage::idle;
 }
 
-void SpectralScreening::keep_features(std::size_t slot) {
-  memory_.floors[slot] = working_.floor;
-  memory_.ready[slot] = working_.ready ? 1 : 0;
+void SpectralScreening::begin_caching(std::uint32_t index) {
+  features_a_ = cached_features(index);
+  begin_features(index, features_a_, Stage::features);
 }
 
 Status SpectralScreening::begin_describe(std::uint32_t index, const GridView& grid) {
+  stage_ = Stage::idle;
   if (index >= config_.max_submaps) {
     return Status::invalid_argument;
   }
   a_ = index;
-  classified_b_ = 0xFFFFFFFFU;
-  const Status status = maker_.begin(grid, scratch_, digest_out(index));
+  featured_b_ = kNone;
+  classified_b_ = kNone;
+  described_ = index;
+  restored_ = kNone;
+  const Status status = maker_.begin(grid, memory_.scratch, digest_out(index));
   stage_ = status == Status::ok ? Stage::digest : Stage::idle;
   return status;
 }
 
 Status SpectralScreening::begin_restore(std::uint32_t index, Span<const std::uint8_t> digest) {
-  const std::size_t size = digest_size(config_.matcher.side);
-  if (index >= config_.max_submaps || digest.size() != size) {
+  stage_ = Stage::idle;
+  if (index >= config_.max_submaps || digest.size() != digest_size(config_.matcher.side)) {
     return Status::invalid_argument;
   }
-  std::memcpy(memory_.digests.data() + index * size, digest.data(), size);
+  if (index == classified_b_ || index == featured_b_) {
+    featured_b_ = kNone;
+    classified_b_ = kNone;
+  }
+  restored_ = index;
+  std::memcpy(digest_out(index).obstacles.data(), digest.data(), digest.size());
   a_ = index;
-  classified_b_ = 0xFFFFFFFFU;
-  stage_ = Stage::idle;
   if (config_.cache_features) {
-    begin_features(index, index, Stage::features);
+    begin_caching(index);
   }
   return Status::ok;
 }
@@ -107,22 +119,25 @@ Status SpectralScreening::begin_restore(std::uint32_t index, Span<const std::uin
 Status SpectralScreening::begin_compare(std::uint32_t a, std::uint32_t b) {
   hypotheses_.clear();
   stage_ = Stage::idle;
-  if (a >= config_.max_submaps || b >= config_.max_submaps) {
+  if (!holds(a) || !holds(b)) {
     return Status::invalid_argument;
   }
   a_ = a;
   b_ = b;
   if (config_.cache_features) {
     begin_match();
+  } else if (featured_b_ == b) {
+    begin_features(a, features_a_, Stage::extract_a);
   } else {
-    begin_features(b, 1, Stage::extract_b);
+    begin_features(b, features_b_, Stage::extract_b);
   }
   return stage_ == Stage::idle ? Status::degenerate : Status::ok;
 }
 
 void SpectralScreening::begin_match() {
-  const Features fa = features(config_.cache_features ? a_ : 0);
-  const Features fb = features(config_.cache_features ? b_ : 1);
+  const bool cached = config_.cache_features;
+  const Features fa = cached ? cached_features(a_) : features_a_;
+  const Features fb = cached ? cached_features(b_) : features_b_;
   stage_ = matcher_.begin_match(fa, fb) == Status::ok ? Stage::match : Stage::idle;
 }
 
@@ -134,25 +149,25 @@ bool SpectralScreening::step() {
       if (maker_.step(kLinesPerStep)) {
         stage_ = Stage::idle;
         if (config_.cache_features) {
-          begin_features(a_, a_, Stage::features);
+          begin_caching(a_);
         }
       }
       break;
     case Stage::features:
       if (matcher_.step()) {
-        keep_features(a_);
+        memory_.floors[a_] = features_a_.floor;
+        memory_.ready[a_] = features_a_.ready ? 1 : 0;
         stage_ = Stage::idle;
       }
       break;
     case Stage::extract_b:
       if (matcher_.step()) {
-        keep_features(1);
-        begin_features(a_, 0, Stage::extract_a);
+        featured_b_ = b_;
+        begin_features(a_, features_a_, Stage::extract_a);
       }
       break;
     case Stage::extract_a:
       if (matcher_.step()) {
-        keep_features(0);
         begin_match();
       }
       break;
@@ -175,7 +190,7 @@ bool SpectralScreening::step() {
 }
 
 ClassView SpectralScreening::classes(std::uint32_t index, Span<std::uint8_t> out) {
-  const Result<ClassView> view = classify(digest(index), config_.verification, out);
+  const Result<ClassView> view = classify(digest_out(index).view(config_.matcher.pixel_m), config_.verification, out);
   return view.ok() ? view.value() : ClassView{};
 }
 

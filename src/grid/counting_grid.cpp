@@ -12,6 +12,9 @@ void CountingGrid::reset(std::int32_t column_min, std::int32_t row_min) {
   for (CellCount& cell : cells_) {
     cell = CellCount{};
   }
+  for (SmallCellCount& cell : small_cells_) {
+    cell = SmallCellCount{};
+  }
   column_min_ = column_min;
   row_min_ = row_min;
   column_base_ = base(column_min);
@@ -36,11 +39,25 @@ void CountingGrid::roll_to(std::int32_t column_min, std::int32_t row_min) {
   clear({old.column_end, now.row_min, now.column_end, now.row_end});
 }
 
+void CountingGrid::copy_from(const CountingGrid& other) {
+  assert(cells_.size() == other.cells_.size() && small_cells_.size() == other.small_cells_.size());
+  for (std::size_t i = 0; i < cells_.size(); ++i) {
+    cells_[i] = other.cells_[i];
+  }
+  for (std::size_t i = 0; i < small_cells_.size(); ++i) {
+    small_cells_[i] = other.small_cells_[i];
+  }
+  column_min_ = other.column_min_;
+  row_min_ = other.row_min_;
+  column_base_ = other.column_base_;
+  row_base_ = other.row_base_;
+}
+
 void CountingGrid::clear(const CellRect& rect) {
   const CellRect inside = intersection(rect, window());
   for (std::int32_t row = inside.row_min; row < inside.row_end; ++row) {
     for (std::int32_t column = inside.column_min; column < inside.column_end; ++column) {
-      at(column, row) = CellCount{};
+      set_cell(index(column, row), {});
     }
   }
 }

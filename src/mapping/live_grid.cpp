@@ -28,6 +28,19 @@ constexpr FieldValues kFieldValues = field_values();
 
 std::uint8_t field_value(std::uint8_t solidity, int dx, int dy) { return kFieldValues.of[dx * dx + dy * dy][solidity]; }
 
+LiveGrid::LiveGrid(const Memory& memory, std::size_t index, std::uint16_t side, float cell_m)
+    : marks_(memory.marks), cell_m_(cell_m) {
+  const std::size_t cells = std::size_t{side} * side;
+  CountingGrid::Memory counts;
+  if (memory.marks.empty()) {
+    counts.cells = memory.counts.cells.subspan(index * cells, cells);
+  } else {
+    counts.small_cells = memory.counts.small_cells.subspan(index * cells, cells);
+  }
+  grid_ = CountingGrid(counts, side);
+  field_ = memory.field.subspan(index * cells, cells);
+}
+
 void LiveGrid::reset(const Pose2& centre) {
   const std::int32_t half = grid_.side() / 2;
   grid_.reset(cell_of(centre.x, cell_m_) - half, cell_of(centre.y, cell_m_) - half);
@@ -110,10 +123,11 @@ void LiveGrid::spread(std::int32_t column, std::int32_t row, const CellRect& rec
 std::uint8_t LiveGrid::recomputed_unbroken(std::size_t index) const {
   std::uint8_t best = 0;
   for (int dy = -kReach; dy <= kReach; ++dy) {
-    const CellCount* const cells = grid_.cells().data() + static_cast<std::ptrdiff_t>(index) + dy * grid_.side();
+    const std::ptrdiff_t line = static_cast<std::ptrdiff_t>(index) + dy * grid_.side();
     for (int dx = -kReach; dx <= kReach; ++dx) {
-      if (cells[dx].hits != 0) {
-        const std::uint8_t value = field_value(solidity(cells[dx]), dx, dy);
+      const CellCount cell = grid_.cell(static_cast<std::size_t>(line + dx));
+      if (cell.hits != 0) {
+        const std::uint8_t value = field_value(solidity(cell), dx, dy);
         best = value > best ? value : best;
       }
     }
@@ -157,37 +171,78 @@ void LiveGrid::solidity_changed(std::int32_t column, std::int32_t row, std::uint
 }
 
 template <int kSign>
+void LiveGrid::count_cell(std::int32_t column, std::int32_t row, bool hit) {
+  const std::size_t index = grid_.index(column, row);
+  CellCount cell = grid_.cell(index);
+  const std::uint8_t before = solidity(cell);
+  cell.observations = static_cast<std::uint16_t>(cell.observations + kSign);
+  cell.hits = static_cast<std::uint16_t>(cell.hits + (hit ? kSign : 0));
+  grid_.set_cell(index, cell);
+  const std::uint8_t after = solidity(cell);
+  if (after != before) {
+    solidity_changed(column, row, before, after);
+  }
+}
+
+/// Each beam counts.
+template <int kSign>
 void LiveGrid::count(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect) {
   const CellRect inside = intersection(rect, grid_.window());
   scans.visit_rays(number, grid_pose(pose, cell_m_), cell_m_, [&](const Ray& ray) {
-    visit_ray(ray, inside, [&](std::int32_t column, std::int32_t row, bool hit) {
-      CellCount& cell = grid_.at(column, row);
-      if (cell.hits == 0 && !hit) {
-        cell.observations = static_cast<std::uint16_t>(cell.observations + kSign);
-        return;
-      }
-      const std::uint8_t before = solidity(cell);
-      cell.observations = static_cast<std::uint16_t>(cell.observations + kSign);
-      cell.hits = static_cast<std::uint16_t>(cell.hits + (hit ? kSign : 0));
-      const std::uint8_t after = solidity(cell);
-      if (after != before) {
-        solidity_changed(column, row, before, after);
+    visit_ray(ray, inside,
+              [&](std::int32_t column, std::int32_t row, bool hit) { count_cell<kSign>(column, row, hit); });
+  });
+}
+
+/// Marks a cell; false where it was marked already.
+bool LiveGrid::mark(std::int32_t column, std::int32_t row) {
+  const std::size_t index = grid_.index(column, row);
+  const auto bit = static_cast<std::uint8_t>(1U << (index % 8));
+  std::uint8_t& byte = marks_[index / 8];
+  const bool first = (byte & bit) == 0;
+  byte = static_cast<std::uint8_t>(byte | bit);
+  return first;
+}
+
+/// Each cell counts once: as hit where any beam ends in it, else as crossed. What a cell counts depends on the scan and
+/// its pose alone, not on `rect`, so that what was added is removed even when the window has cut the rectangle.
+template <int kSign>
+void LiveGrid::count_once(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect) {
+  const CellRect inside = intersection(rect, grid_.window());
+  const GridPose from = grid_pose(pose, cell_m_);
+  std::memset(marks_.data(), 0, marks_.size());
+  scans.visit_rays(number, from, cell_m_, [&](const Ray& ray) {
+    if (ray.hit && inside.contains(ray.column_to, ray.row_to) && mark(ray.column_to, ray.row_to)) {
+      count_cell<kSign>(ray.column_to, ray.row_to, true);
+    }
+  });
+  scans.visit_rays(number, from, cell_m_, [&](const Ray& ray) {
+    visit_ray(ray, inside, [&](std::int32_t column, std::int32_t row, bool /*hit*/) {
+      if (mark(column, row)) {
+        count_cell<kSign>(column, row, false);
       }
     });
   });
 }
 
 void LiveGrid::add(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect) {
-  count<1>(scans, number, pose, rect);
+  if (marks_.empty()) {
+    count<1>(scans, number, pose, rect);
+  } else {
+    count_once<1>(scans, number, pose, rect);
+  }
 }
 
 void LiveGrid::remove(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect) {
-  count<-1>(scans, number, pose, rect);
+  if (marks_.empty()) {
+    count<-1>(scans, number, pose, rect);
+  } else {
+    count_once<-1>(scans, number, pose, rect);
+  }
 }
 
 void LiveGrid::copy_from(const LiveGrid& other) {
-  grid_.set_window_of(other.grid_);
-  std::memcpy(grid_.cells().data(), other.grid_.cells().data(), grid_.cells().size() * sizeof(CellCount));
+  grid_.copy_from(other.grid_);
   std::memcpy(field_.data(), other.field_.data(), field_.size());
 }
 

@@ -48,10 +48,8 @@ ParticleMapper::ParticleMapper(const ParticleMapperConfig& config, const Memory&
       scans_(scan_memory_config(config), memory.scans, lasers),
       matcher_(matcher_config(config), memory.matcher),
       seed_(seed) {
-  const std::size_t cells = std::size_t{config.side} * config.side;
   for (std::size_t p = 0; p < config.particles; ++p) {
-    memory_.particles[p].grid = LiveGrid(memory.grids.cells.subspan(p * cells, cells),
-                                         memory.grids.field.subspan(p * cells, cells), config.side, config.cell_m);
+    memory_.particles[p].grid = LiveGrid(memory.grids, p, config.side, config.cell_m);
   }
   reset({});
 }

@@ -21,8 +21,8 @@ static_assert(same(MELLIN_PART_GRID, Part::grid) && same(MELLIN_PART_SCANS, Part
               same(MELLIN_PART_MAPPER, Part::mapper) && same(MELLIN_PART_SUBMAPS, Part::submaps) &&
               same(MELLIN_PART_SPECTRAL, Part::spectral) && same(MELLIN_PART_DIGESTS, Part::digests) &&
               same(MELLIN_PART_STORE, Part::store) && same(MELLIN_PART_GRAPH, Part::graph) &&
-              same(MELLIN_PART_COLLECTION, Part::collection) && same(MELLIN_PART_SLAM, Part::slam) &&
-              same(MELLIN_PART_COUNT, Part::count));
+              same(MELLIN_PART_COLLECTION, Part::collection) && same(MELLIN_PART_WORKSPACE, Part::workspace) &&
+              same(MELLIN_PART_SLAM, Part::slam) && same(MELLIN_PART_COUNT, Part::count));
 
 constexpr bool same(mellin_scan_use c, ScanUse cpp) { return c == static_cast<int>(cpp); }
 static_assert(same(MELLIN_SCAN_TAKEN, ScanUse::taken) && same(MELLIN_SCAN_MATCHED, ScanUse::matched) &&

@@ -90,6 +90,7 @@ Status validate_numbers(const Config& c, const Log& log) {
       {"max_drift_m", c.submaps.max_drift_m, 0.0F, kMuch, true, not_negative},
       {"max_drift_rad", c.submaps.max_drift_rad, 0.0F, kMuch, true, not_negative},
       {"drift_share", c.submaps.drift_share, 0.0F, 1.0F, true, "0 to 1"},
+      {"min_gain_bits", c.collection.linker.min_gain_bits, 0.0F, 20.0F, true, "0 to 20"},
       {"base_m", edge.base_m, 1e-5F, kMuch, false, "at least 0.00001"},
       {"per_m", edge.per_m, 0.0F, kMuch, true, not_negative},
       {"base_rad", edge.base_rad, 1e-5F, kMuch, false, "at least 0.00001"},
@@ -127,6 +128,9 @@ Status validate(const Config& given, Log log) {
   }
   if (c.remembered_scans < 2) {
     return refuse(log, "remembered_scans", c.remembered_scans, "at least 2");
+  }
+  if (c.mapper.count_once_a_scan && c.remembered_scans > kMaxSmallCellCount) {
+    return refuse(log, "remembered_scans", c.remembered_scans, "at most 255 where they are counted once a scan");
   }
   if (std::uint64_t{c.mapper.max_beams} * c.remembered_scans > kMaxCellCount) {
     return refuse(log, "remembered_scans x beams", static_cast<double>(c.mapper.max_beams) * c.remembered_scans,
@@ -178,6 +182,9 @@ Status validate(const Config& given, Log log) {
   }
   if (c.max_sessions < 1) {
     return refuse(log, "max_sessions", c.max_sessions, "at least 1");
+  }
+  if (c.screening.cache_features && !c.screening.hold_digests) {
+    return refuse(log, "cache_features", 1.0, "0 where hold_digests is 0");
   }
   if (c.collection.linker.pending < 1 || c.collection.linker.pending > kMaxHypotheses) {
     return refuse(log, "pending", c.collection.linker.pending, "1 to 64");

@@ -9,6 +9,10 @@ Result<Slam*> Slam::create(const Config& given, Span<std::byte> memory, const me
     return valid;
   }
   const Config config = resolved(given);
+  if (!config.screening.hold_digests && port.flash.block_count == 0) {
+    log.write(MELLIN_LOG_WARNING, LogLine() << "config: hold_digests is 0, which takes a flash to read digests from");
+    return Status::invalid_config;
+  }
   MeasureArena measure;
   (void)carve(measure, config);
   const std::size_t needed = fast.empty() ? measure.use().total() : measure.use().bulk;
@@ -48,10 +52,10 @@ Status Slam::init(const Config& config, const Memory& memory, const mellin_port&
     status = open_store();
   }
   if (status == Status::ok) {
-    status = screening_.init(config_.screening, memory.screening, memory.scratch);
+    status = screening_.init(config_.screening, memory.screening);
   }
   if (status == Status::ok) {
-    status = registration_.init(config_.registration, memory.registration, memory.scratch);
+    status = registration_.init(config_.registration, memory.registration);
   }
   if (status == Status::ok) {
     status = collection_.init(config_.collection, memory.collection, screening_, registration_, store_, clock_, log_);

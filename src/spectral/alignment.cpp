@@ -15,7 +15,8 @@ constexpr double kDampingStep = 8.0;      // it grows by this where a step makes
 constexpr double kConvergedXy = 1e-3;     // m
 constexpr double kConvergedTheta = 2e-4;  // rad
 constexpr std::uint32_t kFewestInliers = 30;
-constexpr float kNormalWindow_m = 0.3F;  // half side of the window that a wall's direction is taken from
+constexpr float kNormalWindow_m = 0.3F;       // half side of the window that a wall's direction is taken from …
+constexpr float kFewestCellsInWindow = 2.0F;  // … and in cells: 3 x 3 hold three of a thin wall, too few
 constexpr float kMostCellsInWindow = 16.0F;
 constexpr float kStraightness = 0.1F;  // largest ratio of the scatter across to the scatter along a wall
 constexpr float kFewestInWindow = 4.0F;
@@ -159,8 +160,12 @@ Status Alignment::init(const AlignmentConfig& config, const Memory& memory) {
 }
 
 Status Alignment::set_side(Side& side, const GridView& grid) {
-  side.has_field = false;
-  side.has_points = false;
+  for (Side* const each : {&a_, &b_}) {
+    if (each == &side || !config_.keep_both) {
+      each->has_field = false;
+      each->has_points = false;
+    }
+  }
   side.grid = {};
   stage_ = Stage::idle;
   if (side.memory.field.empty() || !valid(grid, config_.max_side)) {
@@ -278,7 +283,8 @@ void Alignment::collect_points() {
   const GridView& grid = from_->grid;
   const int end = slice_end();
   const std::uint32_t wanted = std::min<std::uint32_t>(from_->obstacles, config_.max_points);
-  const int reach = static_cast<int>(std::clamp(kNormalWindow_m / grid.cell_m, 1.0F, kMostCellsInWindow));
+  const int reach =
+      static_cast<int>(std::clamp(kNormalWindow_m / grid.cell_m, kFewestCellsInWindow, kMostCellsInWindow));
   const float half = 0.5F * static_cast<float>(grid.side);
   for (int row = row_; row < end; ++row) {
     const std::uint8_t* const cells = grid.cells.data() + static_cast<std::ptrdiff_t>(row) * grid.side;

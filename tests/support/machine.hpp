@@ -26,6 +26,7 @@ inline Config with_laser(Config config, std::uint16_t beams = 180) {
 inline Config small() {
   Config config = with_laser(nano_profile(), 90);
   config.cell_m = 0.1F;
+  config.screening.hold_digests = true;  // it shall run without flash
   config.submaps.every_scans = 4;
   return config;
 }

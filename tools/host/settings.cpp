@@ -24,6 +24,7 @@ void visit_settings(C& c, Visit&& visit) {
   visit("grid_slots", c.grid_slots);
   visit("seed", c.seed);
   visit("mapper.particles", c.mapper.particles);
+  visit("mapper.count_once_a_scan", c.mapper.count_once_a_scan);
   visit("mapper.spare_scans", c.mapper.spare_scans);
   visit("mapper.take_distance_m", c.mapper.take_distance_m);
   visit("mapper.take_angle_rad", c.mapper.take_angle_rad);
@@ -56,11 +57,14 @@ void visit_settings(C& c, Visit&& visit) {
   visit("screening.max_peaks", c.screening.matcher.max_peaks);
   visit("screening.verified", c.screening.verified);
   visit("screening.cache_features", c.screening.cache_features);
+  visit("screening.hold_digests", c.screening.hold_digests);
   visit("registration.peak_share", c.registration.matcher.peak_share);
   visit("registration.max_peaks", c.registration.matcher.max_peaks);
   visit("registration.aligned", c.registration.aligned);
   visit("registration.aligned_share", c.registration.aligned_share);
   visit("registration.aligned_from", c.registration.aligned_from);
+  visit("registration.alignment.final_m", c.registration.alignment.final_m);
+  visit("registration.alignment.point_sigma_m", c.registration.alignment.point_sigma_m);
   visit("registration.alignment.max_points", c.registration.alignment.max_points);
   visit("registration.alignment.keep_both", c.registration.alignment.keep_both);
   visit("collection.close_loops", c.collection.close_loops);
@@ -84,6 +88,7 @@ void visit_settings(C& c, Visit&& visit) {
   visit("linker.max_sigma_rad", c.collection.linker.max_sigma_rad);
   visit("linker.warp_sigma_m", c.collection.linker.warp_sigma_m);
   visit("linker.warp_sigma_rad", c.collection.linker.warp_sigma_rad);
+  visit("linker.min_gain_bits", c.collection.linker.min_gain_bits);
   visit("linker.information_share", c.collection.linker.information_share);
   visit("graph.max_edges", c.collection.graph.max_edges);
   visit("graph.max_fill", c.collection.graph.max_fill);

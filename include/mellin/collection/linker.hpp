@@ -41,6 +41,11 @@ struct LinkerConfig {
   /// Neighbouring submaps share most of their scans, so their edges repeat one another: each carries this share of its
   /// information.
   float information_share = 0.25F;
+  /// An edge is added only where it tells the graph at least so much, in bits: one half log2 of how much smaller it
+  /// makes the covariance (Ila, Porta, Andrade-Cetto 2010). Several times as much as the room for edges and for the
+  /// factor's fill runs out. Over 0, passing the same places again and again does not use up the graph, and there
+  /// is room left for the loop that closes late.
+  float min_gain_bits = 0.0F;
 };
 
 /// Why a hypothesis became an edge, or did not.
@@ -53,6 +58,7 @@ enum class LinkReason : std::uint8_t {
   confirmed_by_set,  ///< accepted: enough independent witnesses agree
   outlier,           ///< was accepted, and later rejected by the robust optimisation
   forgotten,         ///< dropped while waiting, for lack of room
+  redundant,         ///< the graph knows as much without it
 };
 const char* to_string(LinkReason reason);
 

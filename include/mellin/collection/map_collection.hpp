@@ -63,6 +63,7 @@ struct CollectionStatistics {
   std::uint64_t pairs_accepted = 0;  ///< became edges
   std::uint32_t edges_rejected = 0;  ///< were edges, and then outliers
   std::uint32_t fetches_failed = 0;
+  std::uint32_t digests_missed = 0;  ///< could not be read back when they were to be compared
   std::uint32_t stored = 0;          ///< submaps that are safe in the store
   std::uint32_t not_stored = 0;      ///< submaps that the store refused: they stay in the map until the next start
   std::uint32_t flushes_failed = 0;  ///< poses and edges not stored: the next flush does it all again
@@ -99,6 +100,12 @@ class MapCollection {
   }
   template <class A>
   static constexpr Memory carve(A& arena, const CollectionConfig& config) {
+    return carve(arena, arena, config);
+  }
+  /// The optimiser's memory comes from `work`. The collection uses it from the last registration of a submap to the end
+  /// of that submap's work; the matchers may use it at all other times.
+  template <class A, class W>
+  static constexpr Memory carve(A& arena, W& work, const CollectionConfig& config) {
     Memory m;
     m.headers = arena.template take<SubmapHeader>(config.max_submaps, Part::collection);
     m.scans = arena.template take<NodeScans>(config.max_submaps, Part::collection);
@@ -106,7 +113,7 @@ class MapCollection {
     m.candidates = arena.template take<Candidate>(config.max_submaps, Part::collection);
     m.linker = Linker::carve(arena, config.linker);
     m.graph = PoseGraph::carve(arena, graph_config(config));
-    m.optimiser = Optimiser::carve(arena, graph_config(config));
+    m.optimiser = Optimiser::carve(work, graph_config(config));
     m.record = arena.template take<std::uint8_t>(
         config.digest_bytes > kRecordBytes ? config.digest_bytes : kRecordBytes, Part::collection);
     return m;
@@ -174,6 +181,7 @@ class MapCollection {
     store_edge,
     commit,
     screen,
+    recalling,
     screening,
     choose,
     fetching,
@@ -189,6 +197,8 @@ class MapCollection {
   Result<EdgeId> add_odometry_edge(SubmapId a, SubmapId b, const Sym3& drift);
   void begin_screening();
   void screen_next();
+  void recall_digest();
+  void begin_comparison();
   void finish_screening();
   void choose_candidate();
   void step_fetch();

@@ -40,8 +40,11 @@ class DigestMatcher {
   /// One slice. True when the job is done.
   virtual bool step() = 0;
   virtual const PlaceHypotheses& hypotheses() const = 0;
-  /// What has to be stored to restore a description.
+  /// What has to be stored to restore a description. Of the one described or restored last.
   virtual Span<const std::uint8_t> digest_bytes(std::uint32_t index) const = 0;
+  /// Whether all descriptions are held. Otherwise only that of the submap described last and that of the one restored
+  /// last are: who wants to compare the one with another restores that first.
+  virtual bool holds_digests() const = 0;
 
  protected:
   ~DigestMatcher() = default;

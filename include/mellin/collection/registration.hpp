@@ -34,6 +34,7 @@ class SpectralRegistration final : public GridMatcher {
     Span<std::uint8_t> classes_a;
     Span<std::uint8_t> classes_b;
     Alignment::Memory alignment;
+    Span<float> scratch;  ///< for making pictures
   };
   static constexpr AlignmentConfig alignment_config(const RegistrationConfig& config) {
     AlignmentConfig alignment = config.alignment;
@@ -42,30 +43,55 @@ class SpectralRegistration final : public GridMatcher {
   }
   template <class A>
   static constexpr Memory carve(A& arena, const RegistrationConfig& config) {
+    return carve(arena, arena, config);
+  }
+  /// `work` is needed from set_query() to the end of the last registration of that query, and may be lent to others
+  /// before and after.
+  template <class A, class W>
+  static constexpr Memory carve(A& tables, W& work, const RegistrationConfig& config) {
     const std::uint16_t side = config.matcher.side;
+    const std::size_t classes = std::size_t{config.class_side} * config.class_side;
     Memory m;
-    m.matcher = Matcher::carve(arena, config.matcher);
-    m.features_a = Features::carve(arena, side, FeatureUse::as_a);
-    m.features_b = Features::carve(arena, side, FeatureUse::as_b);
-    m.picture.obstacles = arena.template take<std::uint8_t>(std::size_t{side} * side, Part::spectral);
+    m.matcher = Matcher::carve(tables, work, config.matcher);
+    m.features_a = Features::carve(work, side, FeatureUse::as_a);
+    m.features_b = Features::carve(work, side, FeatureUse::as_b);
+    m.picture.obstacles = work.template take<std::uint8_t>(std::size_t{side} * side, Part::spectral);
     m.picture.side = side;
-    m.classes_a = arena.template take<std::uint8_t>(std::size_t{config.class_side} * config.class_side, Part::spectral);
-    m.classes_b = arena.template take<std::uint8_t>(std::size_t{config.class_side} * config.class_side, Part::spectral);
-    m.alignment = Alignment::carve(arena, alignment_config(config));
+    m.classes_a = work.template take<std::uint8_t>(classes, Part::spectral);
+    m.classes_b = work.template take<std::uint8_t>(classes, Part::spectral);
+    carve_in_turn(work, config, m);
     return m;
   }
-  /// Floats of scratch that init() needs; may be shared with jobs that do not run at the same time.
-  static constexpr std::size_t scratch_size(const RegistrationConfig& config) {
-    return DigestMaker::scratch_size(config.grid_side, config.matcher.side);
-  }
 
-  Status init(const RegistrationConfig& config, const Memory& memory, Span<float> scratch);
+  Status init(const RegistrationConfig& config, const Memory& memory);
   Status set_query(const GridView& b) override;
   Status begin(const GridView& a) override;
   bool step() override;
   const PlaceHypotheses& hypotheses() const override { return hypotheses_; }
 
  private:
+  static constexpr std::size_t scratch_size(const RegistrationConfig& config) {
+    return DigestMaker::scratch_size(config.grid_side, config.matcher.side);
+  }
+  /// Pictures are made before anything is aligned; only what alignment keeps from pair to pair stands in the way.
+  template <class W>
+  static constexpr void carve_in_turn(W& work, const RegistrationConfig& config, Memory& m) {
+    const AlignmentConfig alignment = alignment_config(config);
+    const std::size_t scratch = scratch_size(config);
+    if (alignment.keep_both) {
+      m.alignment = Alignment::carve(work, alignment);
+      m.scratch = work.template take<float>(scratch, Part::spectral);
+      return;
+    }
+    const auto take_scratch = [&](auto& arena) { return arena.template take<float>(scratch, Part::spectral); };
+    const auto take_alignment = [&](auto& arena) { return Alignment::carve(arena, alignment); };
+    const auto block = work.take_workspace(larger(measured(take_scratch), measured(take_alignment)));
+    auto first = work.over(block);
+    m.scratch = take_scratch(first);
+    auto second = work.over(block);
+    m.alignment = take_alignment(second);
+  }
+
   enum class Stage : std::uint8_t {
     idle,
     picture_b,
@@ -89,7 +115,6 @@ class SpectralRegistration final : public GridMatcher {
 
   RegistrationConfig config_;
   Memory memory_;
-  Span<float> scratch_;
   Matcher matcher_;
   DigestMaker maker_;
   Alignment alignment_;

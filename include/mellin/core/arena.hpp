@@ -29,6 +29,7 @@ enum class Part : std::uint8_t {
   store,
   graph,
   collection,
+  workspace,  ///< what several parts use in turn, never at the same time
   slam,
   count
 };
@@ -46,6 +47,21 @@ struct ArenaUse {
   std::size_t fast = 0;
   std::size_t bulk = 0;
   constexpr std::size_t total() const { return fast + bulk; }
+};
+
+/// The larger of both, region by region: what two parts need that take turns.
+constexpr ArenaUse larger(const ArenaUse& a, const ArenaUse& b) {
+  ArenaUse out;
+  out.fast = a.fast > b.fast ? a.fast : b.fast;
+  out.bulk = a.bulk > b.bulk ? a.bulk : b.bulk;
+  return out;
+}
+
+/// Memory that several parts use in turn: each carves its own from over() the block. None may rely on what it left
+/// there when another one has worked meanwhile.
+struct Workspace {
+  Span<std::byte> bulk;
+  Span<std::byte> fast;
 };
 
 namespace detail {
@@ -69,6 +85,12 @@ class MeasureArena {
     (region == Region::fast ? use_.fast : use_.bulk) += bytes;
     return Span<T>(nullptr, count);
   }
+  constexpr Workspace take_workspace(const ArenaUse& largest) {
+    return {take<std::byte>(largest.bulk, Part::workspace),
+            take<std::byte>(largest.fast, Part::workspace, Region::fast)};
+  }
+  /// An arena for one of those who take turns. What it measures is not counted again.
+  constexpr MeasureArena over(const Workspace& /*workspace*/) const { return {}; }
   constexpr const ArenaUse& use() const { return use_; }
 
  private:
@@ -106,6 +128,12 @@ class Arena {
     }
     return Span<T>(typed, count);
   }
+  Workspace take_workspace(const ArenaUse& largest) {
+    return {take<std::byte>(largest.bulk, Part::workspace),
+            take<std::byte>(largest.fast, Part::workspace, Region::fast)};
+  }
+  /// An arena for one of those who take turns.
+  Arena over(const Workspace& workspace) const { return Arena(workspace.bulk, workspace.fast); }
 
  private:
   Span<std::byte> bulk_;
@@ -114,5 +142,22 @@ class Arena {
   bool split_;
   bool ok_ = true;
 };
+
+/// What carve(arena) takes.
+template <class Carve>
+constexpr ArenaUse measured(const Carve& carve) {
+  MeasureArena arena;
+  carve(arena);
+  return arena.use();
+}
+
+/// What carve(kept, work) takes from `work`.
+template <class Carve>
+constexpr ArenaUse measured_work(const Carve& carve) {
+  MeasureArena kept;
+  MeasureArena work;
+  carve(kept, work);
+  return work.use();
+}
 
 }  // namespace mellin

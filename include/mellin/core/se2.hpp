@@ -63,6 +63,10 @@ inline double quadratic_form(const Sym3& m, const Pose2& v) {
          2.0 * (m.xy * v.x * v.y + m.xt * v.x * v.theta + m.yt * v.y * v.theta);
 }
 
+inline double determinant(const Sym3& m) {
+  return m.xx * (m.yy * m.tt - m.yt * m.yt) - m.xy * (m.xy * m.tt - m.yt * m.xt) + m.xt * (m.xy * m.yt - m.yy * m.xt);
+}
+
 /// Inverse of a positive definite matrix. Returns false, leaving `out` as it was, where it is not.
 bool invert(const Sym3& m, Sym3& out);
 

@@ -152,7 +152,7 @@ class BlockCholesky {
   static constexpr Memory carve(A& arena, const BlockCholeskyLimits& limits) {
     Memory memory;
     memory.ordering = BlockOrdering::carve(arena, limits);
-    memory.diagonal = arena.template take<Lower3>(limits.variables, Part::graph);
+    memory.diagonal = arena.template take<Lower3>(limits.variables, Part::graph, Region::fast);
     memory.blocks = arena.template take<Block3>(limits.fill, Part::graph);
     return memory;
   }

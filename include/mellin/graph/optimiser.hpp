@@ -107,6 +107,9 @@ class Optimiser {
   /// Valid after begin(); final when step() has returned false.
   const OptimiserReport& report() const { return report_; }
 
+  /// Blocks below the diagonal that the factor may have.
+  std::uint32_t fill_capacity() const { return config_.max_fill; }
+
   /// Covariance of a_T_b = Xa^-1 Xb over its own parameters (x, y in frame a, theta), at the poses and weights of the
   /// last run, which must have had `marginals` set (Kaess and Dellaert 2009). The covariance; busy while a run is under
   /// way; not_found where a node does not exist; invalid_argument where the last run left no factor of the graph as it

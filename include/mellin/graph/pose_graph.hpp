@@ -113,6 +113,8 @@ class PoseGraph {
 
   std::uint32_t node_count() const { return node_count_; }
   std::uint32_t edge_count() const { return edge_count_; }
+  std::uint32_t node_capacity() const { return static_cast<std::uint32_t>(memory_.poses.size()); }
+  std::uint32_t edge_capacity() const { return static_cast<std::uint32_t>(memory_.edges.size()); }
 
   /// Pose of a node in the frame of its component. Requires node < node_count().
   const Pose2& pose(NodeId node) const { return memory_.poses.first(node_count_)[node]; }

@@ -20,22 +20,35 @@ struct CellCount {
 /// The most that a cell can count. A configuration is valid only if (beams x remembered scans) stays within.
 inline constexpr std::uint32_t kMaxCellCount = 65535;
 
+/// The same in half the bytes, for grids in which a scan counts a cell once at most: a configuration is valid only if
+/// the remembered scans stay within.
+struct SmallCellCount {
+  std::uint8_t observations = 0;  ///< scans of which a beam crossed the cell or ended in it
+  std::uint8_t hits = 0;          ///< scans of which a beam ended in it
+};
+inline constexpr std::uint32_t kMaxSmallCellCount = 255;
+
 /// The cell of the world grid that holds `coordinate_m`.
 std::int32_t cell_of(double coordinate_m, float cell_m);
 
 class CountingGrid {
  public:
+  /// One of the two is empty.
   struct Memory {
     Span<CellCount> cells;
+    Span<SmallCellCount> small_cells;
   };
   template <class A>
-  static constexpr Memory carve(A& arena, std::uint16_t side, std::size_t grids = 1) {
-    return {arena.template take<CellCount>(grids * side * side, Part::grid)};
+  static constexpr Memory carve(A& arena, std::uint16_t side, std::size_t grids = 1, bool small = false) {
+    const std::size_t count = grids * side * side;
+    return {arena.template take<CellCount>(small ? 0 : count, Part::grid),
+            arena.template take<SmallCellCount>(small ? count : 0, Part::grid)};
   }
 
   CountingGrid() = default;
-  /// `cells` has side * side elements.
-  CountingGrid(Span<CellCount> cells, std::uint16_t side) : cells_(cells), side_(side) {}
+  /// side * side elements in one of the spans.
+  CountingGrid(const Memory& memory, std::uint16_t side)
+      : cells_(memory.cells), small_cells_(memory.small_cells), side_(side) {}
 
   std::uint16_t side() const { return side_; }
   CellRect window() const { return {column_min_, row_min_, column_min_ + side_, row_min_ + side_}; }
@@ -47,17 +60,24 @@ class CountingGrid {
   /// enter.
   void roll_to(std::int32_t column_min, std::int32_t row_min);
 
-  /// Takes over the window of a grid of the same side; its cells are copied by the caller.
-  void set_window_of(const CountingGrid& other) {
-    column_min_ = other.column_min_;
-    row_min_ = other.row_min_;
-    column_base_ = other.column_base_;
-    row_base_ = other.row_base_;
-  }
+  /// Makes this grid equal to another one of the same side and kind.
+  void copy_from(const CountingGrid& other);
 
   /// Requires window().contains(column, row).
-  CellCount& at(std::int32_t column, std::int32_t row) { return cells_[index(column, row)]; }
-  const CellCount& at(std::int32_t column, std::int32_t row) const { return cells_[index(column, row)]; }
+  CellCount at(std::int32_t column, std::int32_t row) const { return cell(index(column, row)); }
+
+  /// By the place in memory that index() gives.
+  CellCount cell(std::size_t at) const {
+    return small_cells_.empty() ? cells_[at] : CellCount{small_cells_[at].observations, small_cells_[at].hits};
+  }
+  void set_cell(std::size_t at, const CellCount& count) {
+    if (small_cells_.empty()) {
+      cells_[at] = count;
+    } else {
+      assert(count.observations <= kMaxSmallCellCount);
+      small_cells_[at] = {static_cast<std::uint8_t>(count.observations), static_cast<std::uint8_t>(count.hits)};
+    }
+  }
 
   /// Where a cell of the window lies in memory; arrays that go with the grid use the same places.
   std::size_t index(std::int32_t column, std::int32_t row) const {
@@ -80,9 +100,6 @@ class CountingGrid {
     return cc >= reach && cc <= last && rr >= reach && rr <= last;
   }
 
-  Span<CellCount> cells() { return cells_; }
-  Span<const CellCount> cells() const { return cells_; }
-
  private:
   std::int32_t wrap(std::int32_t i) const { return i >= side_ ? i - side_ : i; }
   std::int32_t base(std::int32_t cell) const {
@@ -92,6 +109,7 @@ class CountingGrid {
   void clear(const CellRect& rect);
 
   Span<CellCount> cells_;
+  Span<SmallCellCount> small_cells_;
   std::uint16_t side_ = 0;
   std::int32_t column_min_ = 0;
   std::int32_t row_min_ = 0;

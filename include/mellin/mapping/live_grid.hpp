@@ -14,19 +14,26 @@ namespace mellin {
 /// the maximum over the 5 x 5 neighbourhood, so that it is a function of the counts alone, whatever their history.
 class LiveGrid {
  public:
+  /// Of one grid, or of several in a row.
   struct Memory {
-    Span<CellCount> cells;
+    CountingGrid::Memory counts;
     Span<std::uint8_t> field;
+    Span<std::uint8_t> marks;  ///< a bit a cell, for all grids: what a scan has counted already; empty: beams count
   };
+  /// `once_a_scan`: a scan counts a cell once, however many of its beams meet there, which halves the counts' bytes.
   template <class A>
-  static constexpr Memory carve(A& arena, std::uint16_t side, std::size_t grids) {
-    return {CountingGrid::carve(arena, side, grids).cells,
-            arena.template take<std::uint8_t>(grids * side * side, Part::grid)};
+  static constexpr Memory carve(A& arena, std::uint16_t side, std::size_t grids, bool once_a_scan = false) {
+    const std::size_t cells = std::size_t{side} * side;
+    Memory m;
+    m.counts = CountingGrid::carve(arena, side, grids, once_a_scan);
+    m.field = arena.template take<std::uint8_t>(grids * cells, Part::grid);
+    m.marks = arena.template take<std::uint8_t>(once_a_scan ? (cells + 7) / 8 : 0, Part::grid, Region::fast);
+    return m;
   }
 
   LiveGrid() = default;
-  LiveGrid(Span<CellCount> cells, Span<std::uint8_t> field, std::uint16_t side, float cell_m)
-      : grid_(cells, side), field_(field), cell_m_(cell_m) {}
+  /// The grid number `index` of those that `memory` was carved for.
+  LiveGrid(const Memory& memory, std::size_t index, std::uint16_t side, float cell_m);
 
   const CountingGrid& grid() const { return grid_; }
   float cell_m() const { return cell_m_; }
@@ -56,6 +63,11 @@ class LiveGrid {
  private:
   template <int kSign>
   void count(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect);
+  template <int kSign>
+  void count_once(const ScanMemory& scans, std::uint32_t number, const Pose2& pose, const CellRect& rect);
+  template <int kSign>
+  void count_cell(std::int32_t column, std::int32_t row, bool hit);
+  bool mark(std::int32_t column, std::int32_t row);
   void solidity_changed(std::int32_t column, std::int32_t row, std::uint8_t before, std::uint8_t after);
   std::uint8_t recomputed(std::int32_t column, std::int32_t row) const;
   std::uint8_t recomputed_unbroken(std::size_t index) const;
@@ -64,6 +76,7 @@ class LiveGrid {
 
   CountingGrid grid_;
   Span<std::uint8_t> field_;
+  Span<std::uint8_t> marks_;
   float cell_m_ = 0.0F;
 };
 

@@ -102,6 +102,8 @@ class Alignment {
   /// Names the grids to align; what was made of the one before is forgotten. A grid stays the caller's and must neither
   /// go nor change as long as it is aligned. invalid_argument: larger than max_side, or a size that does not fit its
   /// cells.
+  /// Unless both are kept (keep_both), what was made of the other one is forgotten too: field and points may be lent
+  /// to others between the end of one alignment and here.
   Status set_a(const GridView& a) { return set_side(a_, a); }
   Status set_b(const GridView& b) { return set_side(b_, b); }
 

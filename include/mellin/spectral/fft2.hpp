@@ -69,18 +69,23 @@ class Fft2 {
 
   template <class A>
   static constexpr Memory carve(A& arena, std::uint16_t side) {
+    return carve(arena, arena, side);
+  }
+  /// Plans from `tables`, where they stay; the lines under way from `work`, which is free between calls.
+  template <class A, class W>
+  static constexpr Memory carve(A& tables, W& work, std::uint16_t side) {
     const std::size_t rows_bytes = kFftLanes > 1 ? real_plan_bytes(side, kFftLanes) : 0;
     const std::size_t columns_bytes = complex_plan_bytes(side, kFftLanes);
     const std::size_t block = kFftLanes > 1 ? kFftLanes * side : kBlock * (side / 2U + 1U);
     Memory m;
-    m.line_forward = arena.template take<std::byte>(real_plan_bytes(side), Part::spectral, Region::fast);
-    m.line_inverse = arena.template take<std::byte>(real_plan_bytes(side), Part::spectral, Region::fast);
-    m.rows_forward = arena.template take<std::byte>(rows_bytes, Part::spectral, Region::fast);
-    m.rows_inverse = arena.template take<std::byte>(rows_bytes, Part::spectral, Region::fast);
-    m.columns_forward = arena.template take<std::byte>(columns_bytes, Part::spectral, Region::fast);
-    m.columns_inverse = arena.template take<std::byte>(columns_bytes, Part::spectral, Region::fast);
-    m.in = arena.template take<Complex>(block, Part::spectral, Region::fast);
-    m.out = arena.template take<Complex>(kFftLanes > 1 ? block : side, Part::spectral, Region::fast);
+    m.line_forward = tables.template take<std::byte>(real_plan_bytes(side), Part::spectral, Region::fast);
+    m.line_inverse = tables.template take<std::byte>(real_plan_bytes(side), Part::spectral, Region::fast);
+    m.rows_forward = tables.template take<std::byte>(rows_bytes, Part::spectral, Region::fast);
+    m.rows_inverse = tables.template take<std::byte>(rows_bytes, Part::spectral, Region::fast);
+    m.columns_forward = tables.template take<std::byte>(columns_bytes, Part::spectral, Region::fast);
+    m.columns_inverse = tables.template take<std::byte>(columns_bytes, Part::spectral, Region::fast);
+    m.in = work.template take<Complex>(block, Part::spectral, Region::fast);
+    m.out = work.template take<Complex>(kFftLanes > 1 ? block : side, Part::spectral, Region::fast);
     return m;
   }
 

@@ -128,16 +128,21 @@ class Matcher {
 
   template <class A>
   static constexpr Memory carve(A& arena, const MatcherConfig& config) {
+    return carve(arena, arena, config);
+  }
+  /// Plans and tables from `tables`, where they stay; what is needed only while a job runs from `work`.
+  template <class A, class W>
+  static constexpr Memory carve(A& tables, W& work, const MatcherConfig& config) {
     const std::size_t side = config.side;
     Memory m;
-    m.fft = Fft2::carve(arena, config.side);
-    m.first = arena.template take<Complex>(spectrum_size(config.side), Part::spectral);
-    m.second = arena.template take<Complex>(spectrum_size(config.side), Part::spectral);
-    m.rows = arena.template take<float>(Fft2::kBlock * side, Part::spectral, Region::fast);
-    m.lines = arena.template take<Complex>(3 * kFftLanes * side, Part::spectral, Region::fast);
-    m.directions = arena.template take<Complex>(side, Part::spectral);
-    m.lowpass = arena.template take<float>(side, Part::spectral, Region::fast);
-    m.correlation = arena.template take<float>(side, Part::spectral);
+    m.fft = Fft2::carve(tables, work, config.side);
+    m.first = work.template take<Complex>(spectrum_size(config.side), Part::spectral);
+    m.second = work.template take<Complex>(spectrum_size(config.side), Part::spectral);
+    m.rows = work.template take<float>(Fft2::kBlock * side, Part::spectral, Region::fast);
+    m.lines = work.template take<Complex>(3 * kFftLanes * side, Part::spectral, Region::fast);
+    m.directions = tables.template take<Complex>(side, Part::spectral);
+    m.lowpass = tables.template take<float>(side, Part::spectral, Region::fast);
+    m.correlation = work.template take<float>(side, Part::spectral);
     return m;
   }
 
