@@ -48,18 +48,5 @@ def sections(objdump, path):
             yield Section(member, fields[1], int(fields[2], 16), frozenset(fields[7].replace(",", "").split()))
 
 
-def data_addresses(objdump, path):
-    """Names of the symbols whose addresses lie in data: virtual tables, tables of functions."""
-    names, in_data = set(), False
-    for line in output(objdump, "-r", path):
-        opened = re.match(r"RELOCATION RECORDS FOR \[(.*)\]", line)
-        if opened:
-            in_data = re.match(r"\.(data|rodata|srodata)", opened[1]) is not None
-        fields = line.split()
-        if in_data and len(fields) == 3 and fields[1].startswith("R_"):
-            names.add(re.sub(r"[-+]0x[0-9a-f]+$", "", fields[2]))
-    return names
-
-
 def output(*command):
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()

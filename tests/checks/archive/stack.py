@@ -1,17 +1,18 @@
 """The deepest stack of each public entry point, summed over the call graph.
 
-usage: stack.py --objdump OBJDUMP --archive ARCHIVE --fft-header FILE --limits FILE [--record | --path NAME] TARGET OBJECT…
+usage: stack.py --fft-header FILE --limits FILE [--record | --path NAME] TARGET OBJECT…
 
 Prints entry point -> bytes. Exit status 1 where one needs more than was recorded and the head-room, where a function
 calls itself (but for KissFFT's kf_work), a frame grows at run time, or a call through a pointer cannot be resolved.
 
 What the sum holds:
 - each function's own frame by GCC's account, the deepest chain of calls; a tail call counts as a call;
-- calls through pointers: virtual functions are every function of that name in a table of the archive; callbacks inside
-  the library are every function of that signature; the port's functions and observers (OF_CALLER) are the caller's own
-  and count as nothing;
-- OUTSIDE bytes for whatever is not compiled here: memcpy and its like, the arithmetic that the processor lacks, sqrt.
-  The compiler does not know them; the deepest of newlib's, picolibc's and libgcc's stays far below;
+- calls through pointers, by the source's line: a virtual function is every virtual function of that name; a callback
+  inside the library is every function of that signature; the port's functions and observers (OF_CALLER) are the
+  caller's own and count as nothing;
+- OUTSIDE bytes, an allowance, for whatever is not compiled here: memcpy and its like, sqrt, and the arithmetic that
+  the processor lacks; of those the compiler tells nothing (stack_high_water.py holds the sum to what an image used).
+  On Linux the dynamic linker may come on top, once, at the first call of each;
 - kf_work as often as a transform has factors. kiss_fft.c takes fours first, then twos, threes, fives, and recurses once
   a factor; the most that a side has which fft2.hpp takes is computed here.
 Interrupts are the firmware's.
@@ -24,7 +25,6 @@ import re
 import sys
 
 import record
-from binutils import data_addresses
 from call_graph import CallGraph, symbol
 
 OUTSIDE = 256
@@ -83,11 +83,11 @@ def called_names(location):
 class Resolver:
     """Puts edges in the place of calls through pointers."""
 
-    def __init__(self, graph, in_tables):
+    def __init__(self, graph):
         self.graph = graph
-        self.virtual = {}
+        self.virtual = {}  # {name: {title}}
         for title in graph.stack:
-            if symbol(title) in in_tables:
+            if re.match(r"(constexpr )?virtual ", graph.declaration(title)):
                 self.virtual.setdefault(graph.name(title), set()).add(title)
 
     def targets(self, name):
@@ -188,8 +188,6 @@ def over_limit(table, recorded):
 
 def parse():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--objdump", default="objdump")
-    parser.add_argument("--archive", required=True)
     parser.add_argument("--fft-header", required=True, help="says which lengths the transform takes")
     parser.add_argument("--limits", required=True, help="what was recorded, of all targets")
     parser.add_argument("--record", action="store_true", help="record instead of comparing")
@@ -202,7 +200,7 @@ def parse():
 def main():
     arguments = parse()
     graph = read_graph(arguments.objects)
-    Resolver(graph, data_addresses(arguments.objdump, arguments.archive)).resolve(of_caller=set())
+    Resolver(graph).resolve(of_caller=set())
     bounds = Bounds(graph, most_factors(arguments.fft_header))
     entries = entry_points(graph)
     if arguments.path:

@@ -89,8 +89,7 @@ def compiled(compiler, folder):
     graph = read_graph([compiled_to])
     of = {graph.name(title): title for title in graph.stack}
     unknown = graph.indirect.pop(of["by_unknown"])
-    tables = {title for title in graph.stack if graph.name(title) == "step"}
-    Resolver(graph, tables).resolve(of_caller=set())
+    Resolver(graph).resolve(of_caller=set())
     bounds = Bounds(graph, 1)
     large = bounds.of(of["by_table"])
     yield check(f"a virtual call is the largest of its functions: {large}", 3500 + OUTSIDE <= large <= 4000 + OUTSIDE)
@@ -98,7 +97,7 @@ def compiled(compiler, folder):
     yield check("a growing frame is refused", "grows" in (refusal(lambda: bounds.of(of["grows"])) or ""))
     yield check("recursion is refused", "recursion" in (refusal(lambda: bounds.of(of["ackermann"])) or ""))
     graph.indirect = {of["by_unknown"]: unknown}
-    resolving = refusal(lambda: Resolver(graph, tables).resolve(of_caller=set()))
+    resolving = refusal(lambda: Resolver(graph).resolve(of_caller=set()))
     yield check("an unknown call is refused", "not known" in (resolving or ""))
     yield check("a missing graph is refused", "missing" in (refusal(lambda: read_graph([folder / "other.o"])) or ""))
 

@@ -1,8 +1,7 @@
 """Holds the sum of stack.py to the truth: a firmware image that paints its stack maps a simulated building, and what it
 used must not be more than the sum over the image's own call graph.
 
-usage: stack_high_water.py --objdump OBJDUMP --archive ARCHIVE --fft-header FILE --program MELLIN --folder DIR
-                           --run COMMAND… --objects OBJECT…
+usage: stack_high_water.py --fft-header FILE --program MELLIN --folder DIR --run COMMAND… --objects OBJECT…
 
 COMMAND runs port/images/map.cpp; --objects are the library's and the image's. --program is the host's, which makes the
 log. Here the port's functions do count: whatever of the image takes a context (void*) first.
@@ -13,7 +12,6 @@ import re
 import subprocess
 import sys
 
-from binutils import data_addresses
 from stack import Bounds, Refused, Resolver, most_factors, read_graph
 
 SCANS = 150
@@ -25,7 +23,7 @@ def bound(arguments):
     library = {title for title in graph.stack if "/src/" in graph.label[title] or "/include/mellin/" in graph.label[title]}
     port = {title for title in graph.stack if "(void*" in graph.declaration(title)} - library
     graph.indirect.pop("start", None)  # constructors, before main()
-    Resolver(graph, data_addresses(arguments.objdump, arguments.archive)).resolve(of_caller=port)
+    Resolver(graph).resolve(of_caller=port)
     bounds = Bounds(graph, most_factors(arguments.fft_header))
     return graph.stack["start"] + START_BYTES + bounds.of("main")
 
@@ -34,15 +32,19 @@ def scans(program, folder):
     """A stream for the image, of a loop in the simulated building."""
     subprocess.run([program, "sim", "-o", folder, "--seed", "1", "--loops", "1"], check=True, stdout=subprocess.DEVNULL)
     stream = folder / "scans.bin"
-    subprocess.run([program, "record", folder / "sim-1.log", "-o", stream, "--scans", str(SCANS)], check=True,
+    subprocess.run([program, "record", folder / "sim-0.log", "-o", stream, "--scans", str(SCANS)], check=True,
                    stdout=subprocess.DEVNULL)
     return stream
 
 
 def used(command):
     """Bytes of stack that the image says it used."""
-    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    # The emulator's semihosting writes to standard error.
+    ran = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    output = ran.stdout
     print(output, end="")
+    if ran.returncode != 0:
+        raise Refused(f"the image ended with status {ran.returncode}")
     found = re.search(r"stack used (\d+) of (\d+) bytes", output)
     submaps = re.search(r"submaps (\d+)", output)
     if found is None or submaps is None or int(submaps[1]) < 2:
@@ -52,8 +54,6 @@ def used(command):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--objdump", default="objdump")
-    parser.add_argument("--archive", required=True)
     parser.add_argument("--fft-header", required=True)
     parser.add_argument("--program", required=True)
     parser.add_argument("--folder", required=True, type=pathlib.Path)
