@@ -35,7 +35,7 @@ ALLOWED = "|".join([
     r"mem(cpy|move|set|cmp)|strlen|strcmp",
     r"sqrtf?|fabsf?|floorf?|ceilf?|truncf?|rintf?|nearbyintf?|fmodf?|fminf?|fmaxf?|fmaf?|copysignf?|ldexpf?|frexpf?",
     r"__aeabi_([dfilu]|ui|ul|[cd][df]|mem|lasr|llsl|llsr).*|__gnu_[fdh]2[fdh].*",
-    r"__(add|sub|mul|div|mod|udiv|umod|neg|cmp|ucmp|ashl|ashr|lshr|float|fix|popcount|c[lt]z).*[sdt][if]\d?",
+    r"__(add|sub|mul|div|mod|udiv|umod|neg|cmp|ucmp|eq|ne|lt|le|gt|ge|unord|ashl|ashr|lshr|float|fix|extend|trunc|popcount|c[lt]z).*[sdt][if]\d?",
     r"__stack_chk_(fail|guard)|_GLOBAL_OFFSET_TABLE_|__cxa_pure_virtual",
 ])
 
