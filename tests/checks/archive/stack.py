@@ -81,7 +81,8 @@ def called_names(location):
 
 
 class Resolver:
-    """Puts edges in the place of calls through pointers."""
+    """Puts edges in the place of calls through pointers. Where the compiler has merged two equal functions, the line is
+    that of one; since the types of what they call are equal too, so is what is found here."""
 
     def __init__(self, graph):
         self.graph = graph

@@ -80,7 +80,7 @@ def limits():
 
 
 def compiled(compiler, folder):
-    folder = pathlib.Path(folder) / "stack_control"
+    folder = pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     source, compiled_to = folder / "control.cpp", folder / "control.o"
     source.write_text(SOURCE)
