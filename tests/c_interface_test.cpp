@@ -324,9 +324,9 @@ TEST_CASE("each error path returns its status") {
   config.max_sessions = 2;
   Board board(mellin_required_bytes(&config));
   mellin_slam* slam = nullptr;
-  CHECK(mellin_create(&config, reinterpret_cast<char*>(board.memory.data()) + 1, board.bytes, nullptr, &slam) ==
+  CHECK(mellin_create(&config, reinterpret_cast<char*>(board.memory.data()) + 1, board.bytes, &board.port, &slam) ==
         MELLIN_INVALID_ARGUMENT);
-  CHECK(mellin_create(&config, board.memory.data(), 8, nullptr, &slam) == MELLIN_INSUFFICIENT_MEMORY);
+  CHECK(mellin_create(&config, board.memory.data(), 8, &board.port, &slam) == MELLIN_INSUFFICIENT_MEMORY);
   mellin_port failing = board.port;
   failing.flash.read = [](void*, std::uint32_t, void*, std::uint32_t) { return -1; };
   CHECK(mellin_create(&config, board.memory.data(), board.bytes, &failing, &slam) == MELLIN_DEVICE_ERROR);

@@ -54,14 +54,15 @@ static void print_log(void* context, mellin_log_level level, const char* line) {
   example_print(line);
 }
 
-/* The nano profile with cells of 10 cm for a small room, and a laser. */
+/* The micro profile, made smaller for a small room, and a laser. */
 static bool configure(mellin_config* config) {
-  if (!succeeded(mellin_config_init(config, MELLIN_PROFILE_NANO))) {
+  if (!succeeded(mellin_config_init(config, MELLIN_PROFILE_MICRO))) {
     return false;
   }
   config->lasers[0] = simulated_laser();
   config->side = 160;
-  config->cell_m = 0.1F;
+  config->registration_side = 40;
+  config->class_side = 80;
   config->max_submaps = 24;
   config->take_distance_m = 0.35F;
   print_number("memory required", mellin_required_bytes(config), " bytes");

@@ -18,14 +18,17 @@ namespace {
 constexpr int kScans = 3 * SIMULATED_STEPS_PER_ROUND;
 
 constexpr mellin::Config configure() {
-  mellin::Config config = mellin::nano_profile();
+  mellin::Config config = mellin::micro_profile();
   config.lasers[0].beams = SIMULATED_BEAMS;
   config.lasers[0].angle_min_rad = static_cast<float>(-mellin::kPi);
   config.lasers[0].angle_increment_rad = static_cast<float>(mellin::kTwoPi / double{SIMULATED_BEAMS});
   config.lasers[0].max_range_m = 20.0F;
-  config.side = 160;
-  config.cell_m = 0.1F;
+  config.side = 160;  // 16 m
+  config.registration_side = 40;
+  config.class_side = 80;
   config.max_submaps = 24;
+  config.collection.graph.max_edges = 96;
+  config.collection.graph.max_fill = 128;
   config.mapper.take_distance_m = 0.35F;
   return config;
 }

@@ -35,8 +35,8 @@ const char* to_string(Status status) {
 }
 
 const char* to_string(Part part) {
-  constexpr const char* kNames[kPartCount] = {"grid",  "scans", "mapper",     "submaps",   "spectral", "digests",
-                                              "store", "graph", "collection", "workspace", "slam"};
+  static constexpr const char* kNames[kPartCount] = {"grid",  "scans", "mapper",     "submaps",   "spectral", "digests",
+                                                     "store", "graph", "collection", "workspace", "slam"};
   const auto i = static_cast<std::size_t>(part);
   return i < kPartCount ? kNames[i] : "unknown";
 }
