@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "mellin/core/random.hpp"
+#include "tests/support/trials.hpp"
 
 using namespace mellin;
 
@@ -173,7 +174,7 @@ TEST_CASE("a tree, a ring and a grid are ordered without needless fill") {
 }
 
 TEST_CASE("solutions agree with a dense factorisation") {
-  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+  for (std::uint64_t seed = 0; seed < static_cast<std::uint64_t>(test::trials(20)); ++seed) {
     Problem p(4 + static_cast<std::uint32_t>(seed * 2), 6 + static_cast<std::uint32_t>(seed * 4), 2000, seed);
     REQUIRE(p.analyse(kUnbounded) == Status::ok);
     for (const std::uint32_t budget : {std::uint32_t{1}, kUnbounded}) {
@@ -205,7 +206,7 @@ TEST_CASE("the projection of the inverse agrees with a dense inverse") {
   const Block3 b_u = {{1.0, 2.0, -1.0, 0.5, 0.0, 3.0, 0.0, -2.0, 1.0}};
   const Block3 b_v = {{0.0, 1.0, 1.0, -1.0, 2.0, 0.0, 4.0, 0.0, 1.0}};
   using RowMajor = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
-  for (std::uint32_t u = 0; u < p.n; ++u) {
+  for (std::uint32_t u = 0; u < static_cast<std::uint32_t>(test::trials(static_cast<int>(p.n))); ++u) {
     for (std::uint32_t v = 0; v < p.n; ++v) {
       Eigen::MatrixXd b = Eigen::MatrixXd::Zero(3 * p.n, 3);
       b.block<3, 3>(3 * u, 0) += Eigen::Map<const RowMajor>(b_u.m);

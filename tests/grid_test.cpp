@@ -9,6 +9,7 @@
 #include "mellin/mapping/live_grid.hpp"
 #include "mellin/mapping/scan_memory.hpp"
 #include "tests/support/cell_map.hpp"
+#include "tests/support/trials.hpp"
 
 using namespace mellin;
 
@@ -129,7 +130,7 @@ TEST_CASE("the byte of a submap cell") {
 
 void live_grid_equals_rebuilt_one(bool once) {
   constexpr std::uint16_t kSide = 64;
-  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+  for (std::uint64_t seed = 1; seed <= static_cast<std::uint64_t>(test::trials(12)); ++seed) {
     Random random(seed, 5);
     World world;
     MeasureArena measured;

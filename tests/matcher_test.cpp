@@ -461,7 +461,7 @@ TEST_SUITE("matcher") {
   }
 
   TEST_CASE("other settings: without low-pass, without high-pass, centre of mass off and wide") {
-    for (int variant = 0; variant < 4; ++variant) {
+    for (int variant = 0; variant < test::trials(4); ++variant) {
       CAPTURE(variant);
       MatcherConfig config = config_of(96, 0.4F);
       config.lowpass_sigma = variant == 0 ? 0.0F : 0.25F;
