@@ -11,6 +11,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "posix/clock.hpp"
@@ -265,9 +266,9 @@ TEST_SUITE("conformance") {
         {Defect::wears_out, "flash.cycles"},
         {Defect::erase_fails_at_last, "flash.blocks_distinct"},
     };
-    for (const auto& [defect, check] : expected) {
-      CAPTURE(check);
-      CHECK(run_defect(defect).failed_at(check));
+    for (const auto& one : expected) {
+      CAPTURE(one.second);
+      CHECK(run_defect(one.first).failed_at(one.second));
     }
   }
 
