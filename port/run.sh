@@ -7,6 +7,12 @@ set -euo pipefail
 board=$1
 image=$2
 shift 2
+# A folder with a run.sh of its own, in port/ or elsewhere: how that board is run.
+case $board in
+  /*) own=$board/run.sh ;;
+  *) own=$(dirname "$0")/$board/run.sh ;;
+esac
+[ ! -e "$own" ] || exec bash "$own" "$image" "$@"
 
 # Instructions instead of time drive the emulated clock, so that each run counts the same: 2^6 ns an instruction on ARM,
 # where the timers' frequency sets the resolution, 1 ns on RISC-V, where the processor itself counts.

@@ -11,13 +11,15 @@
 extern "C" {
 #endif
 
-/* Raw flash. Addresses are bytes from the start of the device. */
+/* Raw flash. Addresses are bytes from the start of the device. What reaches outside of it is refused, with nothing
+ * touched. Buffers have any alignment. port/conformance tests a device for all that is said here. */
 typedef struct mellin_flash {
   void* context;
   /* Copies `size` bytes from `address` to `buffer`. Any address and size inside the device. */
   int (*read)(void* context, uint32_t address, void* buffer, uint32_t size);
   /* Programs `size` bytes at `address`, both multiples of program_unit, into space erased since it was last
-   * programmed. A power cut meanwhile may leave any of the bits programmed. */
+   * programmed; elsewhere it may fail or spoil what was there, but nothing beside it. A power cut meanwhile may leave
+   * any of the bits programmed. */
   int (*program)(void* context, uint32_t address, const void* data, uint32_t size);
   /* Erases block number `block`: afterwards each of its bytes reads erased_value. */
   int (*erase)(void* context, uint32_t block);

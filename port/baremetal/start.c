@@ -26,7 +26,11 @@ static void paint_stack(void) {
   }
 }
 
+/* Most boards need nothing. */
+__attribute__((weak)) void board_initialise(void) {}
+
 void start(void) {
+  board_initialise();
   memcpy(__data_start, __data_load, (size_t)((char*)__data_end - (char*)__data_start));
   memset(__bss_start, 0, (size_t)((char*)__bss_end - (char*)__bss_start));
   paint_stack();
