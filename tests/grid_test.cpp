@@ -142,7 +142,7 @@ void live_grid_equals_rebuilt_one(bool once) {
     Pose2 robot{seed % 2 == 0 ? 0.0 : 2000.0, seed % 2 == 0 ? 0.0 : -1500.0, 0.0};
     live.reset(robot);
     std::vector<Remembered> memory;
-    for (int step = 0; step < 120; ++step) {
+    for (int step = 0; step < 20 + test::trials(100); ++step) {
       robot = {robot.x + 0.4 * random.normal(), robot.y + 0.4 * random.normal(), 3.0 * random.normal()};
       const double what = random.uniform();
       if (what < 0.5) {

@@ -13,7 +13,7 @@ extern "C" {
 enum {
   SIMULATED_BEAMS = 180,           /* once round, two degrees apart */
   SIMULATED_STEPS_PER_ROUND = 80,  /* 20 cm and 4.5 degrees each: a round is 16 m */
-  SIMULATED_PERIOD_US = 200 * 1000 /* between two scans */
+  SIMULATED_PERIOD_US = 100 * 1000 /* between two scans */
 };
 
 /* A position, and the direction of travel as a unit vector and as an angle. */
