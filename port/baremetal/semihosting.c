@@ -8,14 +8,13 @@
 enum {
   SYS_OPEN = 0x01,
   SYS_CLOSE = 0x02,
-  SYS_WRITE0 = 0x04,
   SYS_WRITE = 0x05,
   SYS_READ = 0x06,
   SYS_SEEK = 0x0A,
   SYS_GET_CMDLINE = 0x15,
   SYS_EXIT_EXTENDED = 0x20
 };
-enum { OPEN_READ_BINARY = 1, OPEN_WRITE_BINARY = 5 };
+enum { OPEN_READ_BINARY = 1, OPEN_WRITE = 4, OPEN_WRITE_BINARY = 5 };
 enum { APPLICATION_EXIT = 0x20026 };
 
 static uintptr_t request(uintptr_t operation, const void* block) {
@@ -45,8 +44,6 @@ static uintptr_t request(uintptr_t operation, const void* block) {
 #endif
 }
 
-void board_print(const char* text) { (void)request(SYS_WRITE0, text); }
-
 int board_arguments(char* buffer, uint32_t size) {
   const uintptr_t block[2] = {(uintptr_t)buffer, size};
   return request(SYS_GET_CMDLINE, block) == 0 ? 0 : -1;
@@ -67,6 +64,17 @@ uint32_t board_write(int file, const void* data, uint32_t size) {
   const uintptr_t block[3] = {(uintptr_t)file, (uintptr_t)data, size};
   const uintptr_t missing = request(SYS_WRITE, block);
   return missing <= size ? size - (uint32_t)missing : 0;
+}
+
+/* The special file that stands for the console: the standard output of whoever answers. */
+void board_print(const char* text) {
+  static int console = -1;
+  if (console < 0) {
+    static const char name[] = ":tt";
+    const uintptr_t block[3] = {(uintptr_t)name, OPEN_WRITE, sizeof name - 1};
+    console = (int)request(SYS_OPEN, block);
+  }
+  (void)board_write(console, text, (uint32_t)strlen(text));
 }
 
 int board_seek(int file, uint32_t position) {
