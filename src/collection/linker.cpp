@@ -180,36 +180,48 @@ std::size_t Linker::decide(PoseGraph& graph, Optimiser& optimiser, Span<const No
     if ((eligible >> i & 1U) == 0) {
       continue;
     }
-    const std::uint64_t set = confirmed(graph, query, i, eligible);
+    const Group group = same_components(graph, i, eligible);
+    const std::uint64_t set = confirmed(query, group);
     if (set != 0) {
       return accept(graph, scans, set, LinkReason::confirmed_by_set, context, decided);
     }
+    eligible &= ~group.members;  // from another of its hypotheses the same group would be asked the same again
   }
   return 0;
 }
 
-std::uint64_t Linker::confirmed(const PoseGraph& graph, Query& query, std::size_t index, std::uint64_t eligible) {
-  // All that links the same two components as the newest hypothesis does.
-  LoopHypothesis candidates[kMaxHypotheses];
-  std::size_t places[kMaxHypotheses] = {};
-  std::size_t count = 0;
+Linker::Group Linker::same_components(const PoseGraph& graph, std::size_t index, std::uint64_t eligible) const {
   const LoopHypothesis& seed = pending_[index].hypothesis;
   const NodeId ca = graph.component(seed.a);
   const NodeId cb = graph.component(seed.b);
+  Group group;
+  group.merges = ca != cb;
   for (std::size_t i = 0; i < pending_.size(); ++i) {
     const LoopHypothesis& h = pending_[i].hypothesis;
     const NodeId da = graph.component(h.a);
     const NodeId db = graph.component(h.b);
     if ((eligible >> i & 1U) != 0 && ((da == ca && db == cb) || (da == cb && db == ca))) {
+      group.members |= std::uint64_t{1} << i;
+    }
+  }
+  return group;
+}
+
+std::uint64_t Linker::confirmed(Query& query, const Group& group) const {
+  LoopHypothesis candidates[kMaxHypotheses];
+  std::size_t places[kMaxHypotheses] = {};
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < pending_.size(); ++i) {
+    if ((group.members >> i & 1U) != 0) {
       places[count] = i;
-      candidates[count++] = h;
+      candidates[count++] = pending_[i].hypothesis;
     }
   }
   ConsistencyOptions options;
   options.gate_chi2 = config_.pair_gate_chi2;
   const Result<ConsistentSet> set =
       find_consistent(Span<const LoopHypothesis>(candidates, count), {&query, Query::relative, Query::shared}, options);
-  const std::uint32_t needed = ca == cb ? config_.loop_witnesses : config_.merge_witnesses;
+  const std::uint32_t needed = group.merges ? config_.merge_witnesses : config_.loop_witnesses;
   if (!set.ok() || set.value().witness_count < needed) {
     return 0;
   }

@@ -98,7 +98,7 @@ class Linker {
 
   /// Judges all that waits against the graph, whose marginals must be factorised, and adds edges for what is accepted.
   /// `scans` has an element a node. Calls decided(context, link, edge) for each verdict that changed (edge kNoId where
-  /// it is not accepted). Returns how many edges were added. Cost: at most pending^2 queries of the graph.
+  /// it is not accepted). Returns how many edges were added. Cost: at most 2 pending^2 + pending queries of the graph.
   using Decided = void (*)(void* context, const PendingLink& link, EdgeId edge);
   std::size_t decide(PoseGraph& graph, Optimiser& optimiser, Span<const NodeScans> scans, void* context,
                      Decided decided);
@@ -109,7 +109,13 @@ class Linker {
  private:
   struct Query;
   bool known_well(const Sym3& covariance) const;
-  std::uint64_t confirmed(const PoseGraph& graph, Query& query, std::size_t index, std::uint64_t eligible);
+  /// Waiting hypotheses, a bit each, that link the same two components, or lie in the same one.
+  struct Group {
+    std::uint64_t members = 0;
+    bool merges = false;
+  };
+  Group same_components(const PoseGraph& graph, std::size_t index, std::uint64_t eligible) const;
+  std::uint64_t confirmed(Query& query, const Group& group) const;
   std::size_t accept(PoseGraph& graph, Span<const NodeScans> scans, std::uint64_t members, LinkReason reason,
                      void* context, Decided decided);
 
