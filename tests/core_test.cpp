@@ -95,6 +95,24 @@ TEST_CASE("random numbers: a stream depends on its seed and name only, and is di
   CHECK(fourth / kDraws == doctest::Approx(3.0).epsilon(0.02 * looser));
 }
 
+TEST_CASE("arena: what no size_t can count is measured as the largest, not as little") {
+  constexpr std::size_t most = ~std::size_t{0};
+  MeasureArena one;
+  (void)one.take<double>(most / 8 + 1, Part::grid);  // 8 times that wraps to 0
+  CHECK(one.use().total() == most);
+  MeasureArena sum;
+  (void)sum.take<std::uint8_t>(most / 2, Part::grid);
+  (void)sum.take<std::uint8_t>(most / 2, Part::grid, Region::fast);
+  (void)sum.take<std::uint8_t>(most / 2, Part::graph);
+  CHECK(sum.use().bulk == most);
+  CHECK(sum.use().total() == most);
+  CHECK(sum.use().by_part[static_cast<int>(Part::graph)] >= most / 2);
+  std::uint64_t memory[4];
+  Arena arena({reinterpret_cast<std::byte*>(memory), sizeof memory});
+  CHECK(arena.take<double>(most / 8 + 1, Part::grid).empty());
+  CHECK_FALSE(arena.ok());
+}
+
 TEST_CASE("arena: what is measured is what is used, and one byte less is refused") {
   const auto carve = [](auto& arena) {
     (void)arena.template take<std::uint8_t>(13, Part::grid);

@@ -113,6 +113,30 @@ TEST_CASE("validate() refuses each field out of its range and names it") {
       {"grid_slots", [](Config& c) { c.grid_slots = 1; }},
       {"max_submaps", [](Config& c) { c.max_submaps = 1; }},
       {"max_submaps", [](Config& c) { c.max_submaps = 70000; }},
+      {"particles x side^2",
+       [](Config& c) {
+         c.side = 2048;
+         c.screening_side = 64;
+         c.registration_side = 64;
+         c.class_side = 64;
+         c.mapper.particles = 513;
+       }},
+      {"grid_slots x side^2",
+       [](Config& c) {
+         c.side = 2048;
+         c.screening_side = 64;
+         c.registration_side = 64;
+         c.class_side = 64;
+         c.grid_slots = 513;
+       }},
+      {"screening_side^2",
+       [](Config& c) {
+         c.max_submaps = 65535;
+         c.collection.graph.max_edges = 65535;
+         c.collection.graph.max_fill = 65535;
+         c.screening.hold_digests = true;
+         c.screening_side = static_cast<std::uint16_t>(c.side / 2);
+       }},
       {"screening_side", [](Config& c) { c.screening_side = 20; }},
       {"registration_side", [](Config& c) { c.registration_side = 10; }},
       {"max_fill", [](Config& c) { c.collection.graph.max_fill = c.max_submaps - 1; }},

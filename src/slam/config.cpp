@@ -99,6 +99,26 @@ Status validate_numbers(const Config& c, const Log& log) {
   return validate_all(fields, log);
 }
 
+/// Arrays whose lengths are products: within 2^31 elements, so that a 32-bit processor measures them right.
+Status validate_products(const Config& c, const Log& log) {
+  constexpr std::uint64_t kMost = std::uint64_t{1} << 31U;
+  const char* const expected = "at most 2147483648";
+  const std::uint64_t cells = std::uint64_t{c.side} * c.side;
+  // A digest and its features have up to 16 numbers a pixel.
+  const std::uint64_t pixels = std::uint64_t{c.screening_side} * c.screening_side;
+  const std::uint64_t digests = c.screening.hold_digests ? c.max_submaps : 2;
+  if (c.mapper.particles * cells > kMost) {
+    return refuse(log, "particles x side^2", static_cast<double>(c.mapper.particles * cells), expected);
+  }
+  if (c.grid_slots * cells > kMost) {
+    return refuse(log, "grid_slots x side^2", static_cast<double>(c.grid_slots * cells), expected);
+  }
+  if (16 * digests * pixels > kMost) {
+    return refuse(log, "16 x max_submaps x screening_side^2", static_cast<double>(16 * digests * pixels), expected);
+  }
+  return Status::ok;
+}
+
 /// Whether halving `side` leads to `small`.
 bool halves_to(std::uint32_t side, std::uint32_t small) {
   while (side > small && side % 2 == 0) {
@@ -189,7 +209,7 @@ Status validate(const Config& given, Log log) {
   if (c.collection.linker.pending < 1 || c.collection.linker.pending > kMaxHypotheses) {
     return refuse(log, "pending", c.collection.linker.pending, "1 to 64");
   }
-  return Status::ok;
+  return validate_products(c, log);
 }
 
 }  // namespace mellin

@@ -42,11 +42,34 @@ const char* to_string(Part part);
 /// where its use pays; with a single region given, both come from it.
 enum class Region : std::uint8_t { bulk, fast };
 
+namespace detail {
+inline constexpr std::size_t kMostBytes = ~std::size_t{0};
+
+/// The sum, or the most that can be said: what passes 4 GiB on a 32-bit processor must not look small.
+constexpr std::size_t saturating_sum(std::size_t a, std::size_t b) { return b > kMostBytes - a ? kMostBytes : a + b; }
+
+template <class T>
+constexpr std::size_t carved_bytes(std::size_t count) {
+  static_assert(alignof(T) <= kArenaAlignment, "the arena's alignment does not suffice for this type");
+  static_assert(std::is_trivially_destructible_v<T>, "nothing in the arena is ever destroyed");
+  return count > (kMostBytes - kArenaAlignment) / sizeof(T)
+             ? kMostBytes
+             : (count * sizeof(T) + kArenaAlignment - 1) / kArenaAlignment * kArenaAlignment;
+}
+}  // namespace detail
+
+/// Bytes; sums that are beyond a size_t stay at the largest one.
 struct ArenaUse {
   std::size_t by_part[kPartCount] = {};
   std::size_t fast = 0;
   std::size_t bulk = 0;
-  constexpr std::size_t total() const { return fast + bulk; }
+  constexpr std::size_t total() const { return detail::saturating_sum(fast, bulk); }
+  constexpr void add(std::size_t bytes, Part part, Region region) {
+    std::size_t& of_part = by_part[static_cast<std::size_t>(part)];
+    std::size_t& of_region = region == Region::fast ? fast : bulk;
+    of_part = detail::saturating_sum(of_part, bytes);
+    of_region = detail::saturating_sum(of_region, bytes);
+  }
 };
 
 /// The larger of both, region by region: what two parts need that take turns.
@@ -64,15 +87,6 @@ struct Workspace {
   Span<std::byte> fast;
 };
 
-namespace detail {
-template <class T>
-constexpr std::size_t carved_bytes(std::size_t count) {
-  static_assert(alignof(T) <= kArenaAlignment, "the arena's alignment does not suffice for this type");
-  static_assert(std::is_trivially_destructible_v<T>, "nothing in the arena is ever destroyed");
-  return (count * sizeof(T) + kArenaAlignment - 1) / kArenaAlignment * kArenaAlignment;
-}
-}  // namespace detail
-
 /// Counts without memory; its spans are null and have a size.
 class MeasureArena {
  public:
@@ -81,8 +95,7 @@ class MeasureArena {
   template <class T>
   constexpr Span<T> take(std::size_t count, Part part, Region region = Region::bulk) {
     const std::size_t bytes = detail::carved_bytes<T>(count);
-    use_.by_part[static_cast<std::size_t>(part)] += bytes;
-    (region == Region::fast ? use_.fast : use_.bulk) += bytes;
+    use_.add(bytes, part, region);
     return Span<T>(nullptr, count);
   }
   constexpr Workspace take_workspace(const ArenaUse& largest) {
@@ -113,8 +126,7 @@ class Arena {
   template <class T>
   Span<T> take(std::size_t count, Part part, Region region = Region::bulk) {
     const std::size_t bytes = detail::carved_bytes<T>(count);
-    use_.by_part[static_cast<std::size_t>(part)] += bytes;
-    (region == Region::fast ? use_.fast : use_.bulk) += bytes;
+    use_.add(bytes, part, region);
     Span<std::byte>& from = split_ && region == Region::fast ? fast_ : bulk_;
     if (bytes > from.size()) {
       ok_ = false;
