@@ -180,7 +180,7 @@ struct Bench {
     header.session_T_submap = compose(error, true_pose(map.size()));
     header.first_scan = first_scan;
     header.scan_count = 40;
-    REQUIRE(map.insert(header, slot.value(), Sym3{}).ok());
+    REQUIRE(map.insert(header, slot.value(), SubmapStep{}).ok());
     CHECK(slot.value().empty());  // taken over
     drain();
     CHECK(store->store.slots().pinned() == 0);

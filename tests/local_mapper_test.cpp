@@ -145,6 +145,7 @@ SubmapBuilderConfig builder_config(std::uint16_t band_rows = 32) {
   config.side = 256;
   config.band_rows = band_rows;
   config.drift_share = 0.5F;
+  config.smoother.iterations = 0;
   return config;
 }
 
@@ -168,11 +169,10 @@ Due due_at(const SubmapBuilderConfig& config, int scans, double step_m, const Sy
   for (int i = 1; i <= scans; ++i) {
     mapper.take({i % 2 == 0 ? step_m : 0.0, 0.0, 0.0}, drift);
     if (b.builder.scan_taken(mapper)) {
-      SubmapHeader header;
-      REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}, header) == Status::ok);
+      REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}) == Status::ok);
       b.builder.abort();
       due.after.push_back(i);
-      due.counts.push_back(header.scan_count);
+      due.counts.push_back(b.builder.header().scan_count);
     }
   }
   return due;
@@ -345,9 +345,8 @@ TEST_CASE("a submap is the frozen scans rendered in one piece, whatever the band
     const SubmapBuilderConfig config = builder_config(band_rows);
     Builder b(config);
     std::vector<std::uint8_t> cells(std::size_t{config.side} * config.side, 1);
-    SubmapHeader header;
-    REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}, header) == Status::ok);
-    CHECK(b.builder.begin(mapper, {cells.data(), cells.size()}, header) == Status::busy);
+    REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}) == Status::ok);
+    CHECK(b.builder.begin(mapper, {cells.data(), cells.size()}) == Status::busy);
     int steps = 0;
     for (bool done = false; !done; ++steps) {
       const Result<bool> result = b.builder.step(mapper.scans());
@@ -357,6 +356,7 @@ TEST_CASE("a submap is the frozen scans rendered in one piece, whatever the band
     CHECK(steps == (256 + band_rows - 1) / band_rows);
     CHECK_FALSE(b.builder.active());
     // The ten newest: 5 to 14.
+    const SubmapHeader& header = b.builder.header();
     CHECK(header.first_scan == 5);
     CHECK(header.scan_count == 10);
     CHECK(header.stamp_us == 14000);
@@ -421,37 +421,35 @@ TEST_CASE("the drift between two submaps is that of the scans from middle to mid
   FakeMapper mapper(40, 40);
   Builder b(builder_config());
   std::vector<std::uint8_t> cells(std::size_t{256} * 256);
-  SubmapHeader header;
   for (int i = 0; i < 10; ++i) {
     mapper.take({0.0, 0.0, 0.0}, diagonal(0.01, 0.0004, 0.0));
   }
-  REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}, header) == Status::ok);
-  CHECK(b.builder.drift().xx == 0.0);  // there is none before
+  REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}) == Status::ok);
+  CHECK(b.builder.from_before().drift.xx == 0.0);  // there is none before
   b.builder.abort();
   for (int i = 0; i < 4; ++i) {
     mapper.take({0.0, 0.0, 0.0}, diagonal(0.01, 0.0004, 0.0));
   }
-  REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}, header) == Status::ok);
+  REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}) == Status::ok);
   // Four scans of deviation 0.1 m, half of which is common: (4 * 0.05)^2; across a fifth of it.
-  CHECK(b.builder.drift().xx == doctest::Approx(0.04));
-  CHECK(b.builder.drift().yy == doctest::Approx(0.0016));
+  CHECK(b.builder.from_before().drift.xx == doctest::Approx(0.04));
+  CHECK(b.builder.from_before().drift.yy == doctest::Approx(0.0016));
 }
 
 TEST_CASE("a submap whose scans leave the memory meanwhile is lost, and says so; without scans there is none") {
   FakeMapper mapper(12, 10);
   Builder b(builder_config());
   std::vector<std::uint8_t> cells(std::size_t{256} * 256);
-  SubmapHeader header;
-  CHECK(b.builder.begin(mapper, {cells.data(), cells.size()}, header) == Status::degenerate);
+  CHECK(b.builder.begin(mapper, {cells.data(), cells.size()}) == Status::degenerate);
   for (int i = 0; i < 10; ++i) {
     mapper.take({0.1 * i, 0.0, 0.0});
   }
-  REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}, header) == Status::ok);
+  REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}) == Status::ok);
   mapper.take({1.0, 0.0, 0.0});
   mapper.take({1.1, 0.0, 0.0});
   REQUIRE(b.builder.step(mapper.scans()).ok());  // the spare ones have not run out
   mapper.take({1.2, 0.0, 0.0});
   CHECK(b.builder.step(mapper.scans()).status() == Status::not_found);
   CHECK_FALSE(b.builder.active());
-  CHECK(b.builder.begin(mapper, {cells.data(), cells.size()}, header) == Status::ok);
+  CHECK(b.builder.begin(mapper, {cells.data(), cells.size()}) == Status::ok);
 }

@@ -52,6 +52,8 @@ constexpr Config resolved(const Config& given) {
   c.submaps.max_scans = c.remembered_scans;
   c.submaps.side = c.side;
   c.submaps.cell_m = c.cell_m;
+  c.submaps.smoother.max_scans = c.remembered_scans;
+  c.submaps.smoother.max_beams = beams;
   c.screening.grid_side = c.side;
   c.screening.max_submaps = c.max_submaps;
   c.screening.matcher.side = c.screening_side;
@@ -135,6 +137,7 @@ constexpr Config nano_profile() {
   c.mapper.spare_scans = 4;
   c.mapper.count_once_a_scan = true;
   c.submaps.band_rows = 4;
+  c.submaps.smoother.iterations = 0;  // no room for it
   c.screening.hold_digests = false;
   c.registration.alignment.max_points = 512;
   c.registration.alignment.final_m = 0.2F;  // over the width of a cell, below which points do not lie still

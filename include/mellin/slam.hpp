@@ -129,7 +129,6 @@ class Slam {
   SubmapObserver observer_;
   SlamStatistics statistics_;
   SlotHandle slot_;  ///< of the submap being rendered or waiting for the collection
-  SubmapHeader header_;
   bool rendered_ = false;  ///< slot_ is complete
   Flush flush_ = Flush::none;
 };

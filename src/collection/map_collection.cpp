@@ -36,7 +36,7 @@ Status MapCollection::begin_session(const SessionId& id) {
   return Status::ok;
 }
 
-Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, const Sym3& drift) {
+Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, const SubmapStep& from_before) {
   if (!ready() || session_count_ == 0) {
     return Status::busy;
   }
@@ -55,19 +55,21 @@ Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, co
   memory_.scans[id] = {session_, header.first_scan, header.scan_count};
   slot_ = static_cast<SlotHandle&&>(slot);
   (void)store_->slots().assign(slot_, id);
-  link_odometry(id, drift);
+  link_odometry(id, from_before);
   newest_ = id;
   const bool described = digests_->begin_describe(id, store_->slots().view(slot_)) == Status::ok;
   stage_ = described ? Stage::describe : Stage::store_submap;
   return id;
 }
 
-void MapCollection::link_odometry(SubmapId id, const Sym3& drift) {
+void MapCollection::link_odometry(SubmapId id, const SubmapStep& from_before) {
   odometry_edge_ = kNoId;
   if (newest_ == kNoSubmap) {
     return;
   }
-  const Result<EdgeId> edge = add_odometry_edge(newest_, id, drift);
+  const bool measured = from_before.shared_scans > 0 && from_before.before_first_scan == memory_.scans[newest_].first;
+  const Pose2 step = measured ? from_before.before_T_submap : session_step(newest_, id);
+  const Result<EdgeId> edge = add_odometry_edge(newest_, id, step, from_before.drift);
   if (edge.ok()) {
     odometry_edge_ = edge.value();
   } else {
@@ -76,8 +78,7 @@ void MapCollection::link_odometry(SubmapId id, const Sym3& drift) {
 }
 
 /// The edge between two submaps of a session, as the local mapper saw them lie; `drift` is what it knows of its error.
-Result<EdgeId> MapCollection::add_odometry_edge(SubmapId a, SubmapId b, const Sym3& drift) {
-  const Pose2 step = between(memory_.headers[a].session_T_submap, memory_.headers[b].session_T_submap);
+Result<EdgeId> MapCollection::add_odometry_edge(SubmapId a, SubmapId b, const Pose2& step, const Sym3& drift) {
   const OdometryEdgeNoise& noise = config_.odometry;
   const double distance = translation(step);
   const double m = static_cast<double>(noise.base_m) + static_cast<double>(noise.per_m) * distance;

@@ -248,7 +248,7 @@ void MapCollection::bridge_gaps() {
       continue;
     }
     if (!whole && last != kNoSubmap && memory_.scans[last].session == memory_.scans[id].session) {
-      (void)add_odometry_edge(last, id, {});
+      (void)add_odometry_edge(last, id, session_step(last, id), {});
     }
     last = id;
     whole = true;

@@ -1,5 +1,7 @@
 #include "mellin/mapping/scan_matcher.hpp"
 
+#include "mapping/surface.hpp"
+
 namespace mellin {
 namespace {
 
@@ -65,54 +67,6 @@ struct ScanMatcher::Linearised {
   std::size_t inliers = 0;
 };
 
-namespace {
-
-constexpr float kNormalBase_m = 0.25F;  // to the neighbours on both sides that a normal is taken from
-constexpr float kSurfaceGap_m = 0.6F;   // between neighbouring ends that may lie on one surface
-constexpr int kNormalReach = 8;         // beams
-constexpr float kStraight = 0.15F;      // share of the chord by which its middle may be off, or it is a corner
-
-float squared_distance(const Point2f& a, const Point2f& b) {
-  return (a.x - b.x) * (a.x - b.x) + (a.y - b.y) * (a.y - b.y);
-}
-
-}  // namespace
-
-/// The first point in that direction along the surface that is far enough for a normal; the point itself where the
-/// surface ends before.
-std::size_t ScanMatcher::neighbour(std::size_t point, int direction, float cell_m) const {
-  const float base = kNormalBase_m / cell_m;
-  const float gap = kSurfaceGap_m / cell_m;
-  std::size_t at = point;
-  for (int i = 0; i < kNormalReach; ++i) {
-    const bool last = direction < 0 ? at == 0 : at + 1 >= count_;
-    const std::size_t next = direction < 0 ? at - 1 : at + 1;
-    if (last || squared_distance(memory_.points[at], memory_.points[next]) > gap * gap) {
-      return point;
-    }
-    at = next;
-    if (squared_distance(memory_.points[point], memory_.points[at]) >= base * base) {
-      return at;
-    }
-  }
-  return point;
-}
-
-/// From the neighbours on both sides, or on the one where the surface goes on.
-Point2f ScanMatcher::normal(std::size_t point, float cell_m) const {
-  const Point2f a = memory_.points[neighbour(point, -1, cell_m)];
-  const Point2f b = memory_.points[neighbour(point, 1, cell_m)];
-  const float squared = squared_distance(a, b);
-  if (squared == 0.0F) {
-    return {};
-  }
-  const Point2f q = memory_.points[point];
-  const float inverse = 1.0F / sqrt(squared);
-  const Point2f n{(b.y - a.y) * inverse, (a.x - b.x) * inverse};
-  const float off = (n.x * (q.x - a.x) + n.y * (q.y - a.y)) * inverse;
-  return off > kStraight || off < -kStraight ? Point2f{} : n;  // a corner has none
-}
-
 std::size_t ScanMatcher::set_scan(Span<const StoredRange> ranges, Span<const Point2f> directions,
                                   const Pose2& base_T_laser, float cell_m) {
   count_ = 0;
@@ -126,8 +80,9 @@ std::size_t ScanMatcher::set_scan(Span<const StoredRange> ranges, Span<const Poi
       memory_.points[count_++] = {mount_x + directions[i].x * length, mount_y + directions[i].y * length};
     }
   }
+  const Span<const Point2f> ends = memory_.points.first(count_);
   for (std::size_t i = 0; i < count_; ++i) {
-    memory_.normals[i] = normal(i, cell_m);
+    memory_.normals[i] = surface::normal(ends, i, cell_m);
   }
   return count_;
 }
@@ -249,23 +204,24 @@ MatchResult ScanMatcher::refine(const LiveGrid& grid, const Pose2& start, const 
 Sym3 ScanMatcher::scan_information(const LiveGrid& grid, const Pose2& pose) const {
   const float cell = grid.cell_m();
   const GridPose at = grid_pose(pose, cell);
+  const Span<const Point2f> ends = memory_.points.first(count_);
   float xx = 0.0F, xy = 0.0F, xt = 0.0F, yy = 0.0F, yt = 0.0F, tt = 0.0F;
   for (std::size_t i = 0; i < count_; ++i) {
     const Point2f q = memory_.points[i];
     const Sample met = sample(grid, at.column, at.row, at.x_cells + at.cos * q.x - at.sin * q.y,
                               at.y_cells + at.sin * q.x + at.cos * q.y);
-    const std::size_t before = neighbour(i, -1, cell);
-    const std::size_t behind = neighbour(i, 1, cell);
+    const std::size_t before = surface::neighbour(ends, i, -1, cell);
+    const std::size_t behind = surface::neighbour(ends, i, 1, cell);
     if (met.value <= kInlierField || before == i || behind == i) {
       continue;
     }
     const Point2f a = memory_.points[before];
     const Point2f b = memory_.points[behind];
-    const float length = sqrt(squared_distance(a, b));
+    const float length = sqrt(surface::squared_distance(a, b));
     const float nx = (b.y - a.y) / length;
     const float ny = (a.x - b.x) / length;
     const float off = nx * (q.x - a.x) + ny * (q.y - a.y);
-    if (off > kStraight * length || off < -kStraight * length) {
+    if (off > surface::kStraight * length || off < -surface::kStraight * length) {
       continue;
     }
     const float nt = (ny * q.x - nx * q.y) * cell;

@@ -3,7 +3,7 @@
 namespace mellin {
 
 void SubmapBuilder::reset() {
-  active_ = false;
+  stage_ = Stage::idle;
   any_frozen_ = false;
   taken_ = 0;
   new_scans_ = 0;
@@ -54,14 +54,17 @@ std::uint32_t SubmapBuilder::scans_in_reach(const LocalMapper& mapper) const {
   return count;
 }
 
-Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells, SubmapHeader& header) {
-  if (active_) {
+Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells) {
+  if (active()) {
     return Status::busy;
   }
   const std::uint32_t end = mapper.scans().end();
   if (end == 0) {
     return Status::degenerate;
   }
+  first_before_ = first_scan_;
+  count_before_ = any_frozen_ ? scan_count_ : 0;
+  swap_poses();
   scan_count_ = scans_in_reach(mapper);
   first_scan_ = end - scan_count_;
   Pose2 low = mapper.scan_pose(first_scan_);
@@ -75,22 +78,65 @@ Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells,
   for (std::uint32_t i = 0; i < scan_count_; ++i) {
     memory_.poses[i] = between(centre, mapper.scan_pose(first_scan_ + i));
   }
+  session_T_newest_ = mapper.scan_pose(end - 1);
   const std::uint32_t middle = first_scan_ + scan_count_ / 2;
-  drift_ = any_frozen_ ? drift_since(mapper, centre, middle_, middle) : Sym3{};
+  from_before_ = SubmapStep{};
+  from_before_.drift = any_frozen_ ? drift_since(mapper, centre, middle_, middle) : Sym3{};
   middle_ = middle;
-  header.session_T_submap = centre;
-  header.submap_T_robot = memory_.poses[scan_count_ - 1];
-  header.stamp_us = mapper.scans().stamp_us(end - 1);
-  header.first_scan = first_scan_;
-  header.scan_count = scan_count_;
+  header_ = SubmapHeader{};
+  header_.stamp_us = mapper.scans().stamp_us(end - 1);
+  header_.first_scan = first_scan_;
+  header_.scan_count = scan_count_;
   cells_ = cells;
   next_row_ = 0;
-  active_ = true;
+  smoother_.begin(first_scan_, memory_.poses.first(scan_count_));
+  stage_ = Stage::smooth;
   any_frozen_ = true;
   new_scans_ = 0;
   new_path_m_ = 0.0;
   new_drift_ = Sym3{};
   return Status::ok;
+}
+
+void SubmapBuilder::swap_poses() {
+  const Span<Pose2> poses = memory_.poses;
+  memory_.poses = memory_.poses_before;
+  memory_.poses_before = poses;
+}
+
+/// The submap's place, when its scans have theirs: where the newest of them is stays as the local mapper has it.
+void SubmapBuilder::place() {
+  header_.submap_T_robot = memory_.poses[scan_count_ - 1];
+  header_.session_T_submap = compose(session_T_newest_, inverse(header_.submap_T_robot));
+  from_before_.before_first_scan = first_before_;
+  const std::uint32_t end_before = first_before_ + count_before_;
+  from_before_.shared_scans = end_before > first_scan_ ? end_before - first_scan_ : 0;
+  if (from_before_.shared_scans > 0) {
+    from_before_.before_T_submap = measured_step(from_before_.shared_scans);
+  }
+}
+
+/// The motion that lays the shared scans, as this submap has them, on where the one before has them: the mean of the
+/// turns, and of the shifts that are left.
+Pose2 SubmapBuilder::measured_step(std::uint32_t shared) const {
+  const Span<const Pose2> here = memory_.poses.first(shared);
+  const Span<const Pose2> before = memory_.poses_before.subspan(first_scan_ - first_before_, shared);
+  const double first_turn = before[0].theta - here[0].theta;
+  double turn = 0.0;
+  for (std::uint32_t i = 0; i < shared; ++i) {
+    turn += wrap_angle(before[i].theta - here[i].theta - first_turn);
+  }
+  Pose2 step{0.0, 0.0, wrap_angle(first_turn + turn / shared)};
+  double x = 0.0;
+  double y = 0.0;
+  for (std::uint32_t i = 0; i < shared; ++i) {
+    const Pose2 turned = compose(step, here[i]);
+    x += before[i].x - turned.x;
+    y += before[i].y - turned.y;
+  }
+  step.x = x / shared;
+  step.y = y / shared;
+  return step;
 }
 
 Sym3 SubmapBuilder::drift_since(const LocalMapper& mapper, const Pose2& session_T_submap, std::uint32_t from,
@@ -108,13 +154,25 @@ Sym3 SubmapBuilder::drift_since(const LocalMapper& mapper, const Pose2& session_
 }
 
 Result<bool> SubmapBuilder::step(const ScanMemory& scans) {
-  if (!active_) {
+  if (!active()) {
     return true;
   }
   if (!scans.holds(first_scan_)) {
-    active_ = false;
+    stage_ = Stage::idle;
     return Status::not_found;
   }
+  if (stage_ == Stage::smooth && !smoother_.step(scans)) {
+    place();
+    stage_ = Stage::render;
+  }
+  if (stage_ == Stage::render) {
+    render_band(scans);
+    stage_ = next_row_ < config_.side ? Stage::render : Stage::idle;
+  }
+  return !active();
+}
+
+void SubmapBuilder::render_band(const ScanMemory& scans) {
   const std::int32_t half = config_.side / 2;
   const auto rows = static_cast<std::int32_t>(config_.side - next_row_ < config_.band_rows ? config_.side - next_row_
                                                                                            : config_.band_rows);
@@ -139,8 +197,6 @@ Result<bool> SubmapBuilder::step(const ScanMemory& scans) {
     cells_[first + i] = submap_cell(memory_.band[i]);
   }
   next_row_ = static_cast<std::uint16_t>(next_row_ + rows);
-  active_ = next_row_ < config_.side;
-  return !active_;
 }
 
 }  // namespace mellin

@@ -90,6 +90,11 @@ Status validate_numbers(const Config& c, const Log& log) {
       {"max_drift_m", c.submaps.max_drift_m, 0.0F, kMuch, true, not_negative},
       {"max_drift_rad", c.submaps.max_drift_rad, 0.0F, kMuch, true, not_negative},
       {"drift_share", c.submaps.drift_share, 0.0F, 1.0F, true, "0 to 1"},
+      {"smoother.reach_m", c.submaps.smoother.reach_m, 0.0F, 10.0F, false, "over 0, at most 10"},
+      {"smoother.point_sigma_m", c.submaps.smoother.point_sigma_m, 1e-3F, 10.0F, true, "0.001 to 10"},
+      {"smoother.independent_share", c.submaps.smoother.independent_share, 0.0F, 1.0F, true, "0 to 1"},
+      {"smoother.step_sigma_m", c.submaps.smoother.step_sigma_m, 1e-3F, 10.0F, true, "0.001 to 10"},
+      {"smoother.step_sigma_rad", c.submaps.smoother.step_sigma_rad, 1e-3F, 10.0F, true, "0.001 to 10"},
       {"min_gain_bits", c.collection.linker.min_gain_bits, 0.0F, 20.0F, true, "0 to 20"},
       {"base_m", edge.base_m, 1e-5F, kMuch, false, "at least 0.00001"},
       {"per_m", edge.per_m, 0.0F, kMuch, true, not_negative},
@@ -184,6 +189,12 @@ Status validate(const Config& given, Log log) {
   }
   if (c.class_side < 16 || c.side % c.class_side != 0) {
     return refuse(log, "class_side", c.class_side, "a divisor of side, at least 16");
+  }
+  if (c.submaps.smoother.points < 1) {
+    return refuse(log, "smoother.points", c.submaps.smoother.points, "at least 1");
+  }
+  if (c.submaps.smoother.partners > ScanSmoother::kMostPartners) {
+    return refuse(log, "smoother.partners", c.submaps.smoother.partners, "at most 10");
   }
   if (c.grid_slots < 2) {
     return refuse(log, "grid_slots", c.grid_slots, "at least 2");

@@ -124,8 +124,7 @@ void Slam::freeze_if_due(bool due) {
     return;
   }
   slot_ = static_cast<SlotHandle&&>(slot.value());
-  header_ = SubmapHeader{};
-  if (builder_.begin(mapper_, store_.slots().cells(slot_), header_) != Status::ok) {
+  if (builder_.begin(mapper_, store_.slots().cells(slot_)) != Status::ok) {
     (void)store_.slots().release(slot_);
     return;
   }
@@ -145,7 +144,7 @@ void Slam::render_slice() {
 }
 
 void Slam::hand_over() {
-  const Result<SubmapId> id = collection_.insert(header_, slot_, builder_.drift());
+  const Result<SubmapId> id = collection_.insert(builder_.header(), slot_, builder_.from_before());
   rendered_ = false;
   if (!id.ok()) {
     ++statistics_.submaps_lost;

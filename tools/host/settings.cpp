@@ -49,6 +49,14 @@ void visit_settings(C& c, Visit&& visit) {
   visit("submaps.every_scans", c.submaps.every_scans);
   visit("submaps.every_path_m", c.submaps.every_path_m);
   visit("submaps.drift_share", c.submaps.drift_share);
+  visit("submaps.smoother.iterations", c.submaps.smoother.iterations);
+  visit("submaps.smoother.points", c.submaps.smoother.points);
+  visit("submaps.smoother.partners", c.submaps.smoother.partners);
+  visit("submaps.smoother.reach_m", c.submaps.smoother.reach_m);
+  visit("submaps.smoother.point_sigma_m", c.submaps.smoother.point_sigma_m);
+  visit("submaps.smoother.independent_share", c.submaps.smoother.independent_share);
+  visit("submaps.smoother.step_sigma_m", c.submaps.smoother.step_sigma_m);
+  visit("submaps.smoother.step_sigma_rad", c.submaps.smoother.step_sigma_rad);
   visit("submaps.max_drift_m", c.submaps.max_drift_m);
   visit("submaps.max_drift_rad", c.submaps.max_drift_rad);
   visit("submaps.min_scans", c.submaps.min_scans);

@@ -133,9 +133,10 @@ class MapCollection {
   Status begin_session(const SessionId& id);
 
   /// Takes a submap that was rendered into the slot (header without id and session) and starts to work on it; the
-  /// handle is taken over. `drift` is the covariance of the submap's pose against the one before, in its own frame.
-  /// Returns its id. busy: step() has not finished with the one before. full: max_submaps.
-  Result<SubmapId> insert(SubmapHeader header, SlotHandle& slot, const Sym3& drift);
+  /// handle is taken over. An odometry edge joins it to the session's submap before: as `from_before` measured it, or,
+  /// where that is about another submap or no measurement, as their poses in the session have it. Returns its id. busy:
+  /// step() has not finished with the one before. full: max_submaps.
+  Result<SubmapId> insert(SubmapHeader header, SlotHandle& slot, const SubmapStep& from_before);
 
   /// Whether step() has nothing to do.
   bool idle() const { return stage_ == Stage::idle; }
@@ -193,8 +194,12 @@ class MapCollection {
   };
 
   void run_slice();
-  void link_odometry(SubmapId id, const Sym3& drift);
-  Result<EdgeId> add_odometry_edge(SubmapId a, SubmapId b, const Sym3& drift);
+  void link_odometry(SubmapId id, const SubmapStep& from_before);
+  /// How b lies to a by their poses in their session.
+  Pose2 session_step(SubmapId a, SubmapId b) const {
+    return between(memory_.headers[a].session_T_submap, memory_.headers[b].session_T_submap);
+  }
+  Result<EdgeId> add_odometry_edge(SubmapId a, SubmapId b, const Pose2& step, const Sym3& drift);
   void begin_screening();
   void screen_next();
   void recall_digest();

@@ -56,4 +56,13 @@ struct SubmapHeader {
   std::uint32_t scan_count = 0;  ///< … and how many in a row
 };
 
+/// How a submap lies to the one that was frozen before it in its session.
+struct SubmapStep {
+  std::uint32_t before_first_scan = 0;  ///< first scan of the one before, to tell it from a submap that was lost
+  std::uint32_t shared_scans = 0;       ///< that both render, and by which the step was measured; 0: it was not
+  Pose2 before_T_submap;
+  /// What the local mapper may have drifted in between, as a covariance of this submap's pose in its own frame.
+  Sym3 drift;
+};
+
 }  // namespace mellin

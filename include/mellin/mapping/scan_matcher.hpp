@@ -86,8 +86,6 @@ class ScanMatcher {
  private:
   struct Linearised;
   Linearised linearise(const LiveGrid& grid, const GridPose& at, float x, float y, float theta) const;
-  std::size_t neighbour(std::size_t point, int direction, float cell_m) const;
-  Point2f normal(std::size_t point, float cell_m) const;
   struct SearchPoints;
   SearchPoints place_points(const LiveGrid& grid, const GridPose& at, float theta, std::size_t stride,
                             std::int32_t reach_cells) const;

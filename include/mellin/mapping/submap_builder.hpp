@@ -9,6 +9,7 @@
 #include "mellin/grid/counting_grid.hpp"
 #include "mellin/grid/submap.hpp"
 #include "mellin/mapping/local_mapper.hpp"
+#include "mellin/mapping/scan_smoother.hpp"
 
 namespace mellin {
 
@@ -28,6 +29,7 @@ struct SubmapBuilderConfig {
   std::uint16_t side = 768;  ///< cells of the grid; even
   float cell_m = 0.05F;
   std::uint16_t band_rows = 32;  ///< rows rendered in one slice; memory in proportion
+  ScanSmootherConfig smoother;
 };
 
 /// Renders one submap at a time, band by band. The scans it renders must stay in the scan memory until it is done.
@@ -36,15 +38,19 @@ class SubmapBuilder {
   struct Memory {
     Span<CellCount> band;
     Span<Pose2> poses;
+    Span<Pose2> poses_before;  ///< of the submap before
+    ScanSmoother::Memory smoother;
   };
   template <class A>
   static constexpr Memory carve(A& arena, const SubmapBuilderConfig& config) {
     return {arena.template take<CellCount>(std::size_t{config.band_rows} * config.side, Part::submaps),
-            arena.template take<Pose2>(config.max_scans, Part::submaps)};
+            arena.template take<Pose2>(config.max_scans, Part::submaps),
+            arena.template take<Pose2>(config.max_scans, Part::submaps), ScanSmoother::carve(arena, config.smoother)};
   }
 
   SubmapBuilder() = default;
-  SubmapBuilder(const SubmapBuilderConfig& config, const Memory& memory) : config_(config), memory_(memory) {}
+  SubmapBuilder(const SubmapBuilderConfig& config, const Memory& memory)
+      : config_(config), memory_(memory), smoother_(config.smoother, memory.smoother) {}
 
   /// A new session: counts path and scans from here.
   void reset();
@@ -54,25 +60,34 @@ class SubmapBuilder {
   /// Whether scans were taken that no submap holds yet.
   bool has_unfrozen() const { return new_scans_ > 0; }
 
-  /// Freezes the newest scans: takes over their poses and fills in the header (all but id and session). Rendering into
-  /// `cells` (side * side) follows in steps. busy: a submap is being rendered. degenerate: no scan was taken.
-  Status begin(const LocalMapper& mapper, Span<std::uint8_t> cells, SubmapHeader& header);
-  /// What the local mapper may have drifted between the submap before and this one, as a covariance of this one's pose
-  /// in its own frame: the scans from the middle of the one to the middle of the other, with errors that all point the
-  /// same way, since what a scan does not determine is wrong by the odometry's bias again and again.
-  const Sym3& drift() const { return drift_; }
-  /// Renders the next band. Returns true when the grid is complete. not_found: a scan has left the memory meanwhile;
-  /// the submap is lost. Cost: band_rows x side cells, and the beams of max_scans scans clipped to them.
+  /// Freezes the newest scans: takes over their poses. Smoothing them and rendering into `cells` (side * side) follow
+  /// in steps. busy: a submap is being made. degenerate: no scan was taken.
+  Status begin(const LocalMapper& mapper, Span<std::uint8_t> cells);
+  /// The next slice of smoothing, or the next band. Returns true when the grid is complete. not_found: a scan has left
+  /// the memory meanwhile; the submap is lost. Cost: that of ScanSmoother::step(), or band_rows x side cells and the
+  /// beams of max_scans scans clipped to them.
   Result<bool> step(const ScanMemory& scans);
-  bool active() const { return active_; }
-  void abort() { active_ = false; }
+  /// Of the submap that step() completed (all but id and session).
+  const SubmapHeader& header() const { return header_; }
+  /// From the submap before to this one, as the scans that both hold have it, and what the local mapper may have
+  /// drifted: the scans from the middle of the one to the middle of the other, with errors that all point the same way,
+  /// since what a scan does not determine is wrong by the odometry's bias again and again.
+  const SubmapStep& from_before() const { return from_before_; }
+  bool active() const { return stage_ != Stage::idle; }
+  void abort() { stage_ = Stage::idle; }
 
-  /// The frozen scans: numbers from first_scan(), and their poses in the submap's frame. Valid from begin() until the
-  /// next begin().
+  /// The frozen scans: numbers from first_scan(), and their poses in the submap's frame. Valid from when step() has
+  /// completed the submap until the next begin().
   std::uint32_t first_scan() const { return first_scan_; }
   Span<const Pose2> submap_T_scan() const { return memory_.poses.first(scan_count_); }
 
  private:
+  enum class Stage : std::uint8_t { idle, smooth, render };
+
+  void swap_poses();
+  void place();
+  Pose2 measured_step(std::uint32_t shared) const;
+  void render_band(const ScanMemory& scans);
   std::uint32_t scans_in_reach(const LocalMapper& mapper) const;
   bool too_uncertain(const Sym3& drift) const;
   Sym3 drift_since(const LocalMapper& mapper, const Pose2& session_T_submap, std::uint32_t from,
@@ -80,11 +95,17 @@ class SubmapBuilder {
 
   SubmapBuilderConfig config_;
   Memory memory_;
+  ScanSmoother smoother_;
   Span<std::uint8_t> cells_;
-  bool active_ = false;
+  Stage stage_ = Stage::idle;
   std::uint16_t next_row_ = 0;
   std::uint32_t first_scan_ = 0;
   std::uint32_t scan_count_ = 0;
+  std::uint32_t first_before_ = 0;  ///< of the submap before
+  std::uint32_t count_before_ = 0;
+  Pose2 session_T_newest_;  ///< the newest frozen scan, as the local mapper has it
+  SubmapHeader header_;
+  SubmapStep from_before_;
   std::uint32_t taken_ = 0;      ///< scans of the session
   std::uint32_t new_scans_ = 0;  ///< since the last submap
   double path_m_ = 0.0;          ///< of the session
@@ -93,7 +114,6 @@ class SubmapBuilder {
   Pose2 last_pose_;
   bool any_frozen_ = false;
   std::uint32_t middle_ = 0;  ///< number of the scan in the middle of the last submap
-  Sym3 drift_;
 };
 
 }  // namespace mellin
