@@ -269,7 +269,7 @@ TEST_CASE("the files read back as what was simulated") {
 
 TEST_CASE("options outside their limits are refused") {
   SimOptions options;
-  options.beams = 181;
+  options.beams = 182;
   CHECK_THROWS_AS((void)simulate(options, 0), std::invalid_argument);
   options = {};
   options.range_m = NAN;
