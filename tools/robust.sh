@@ -39,14 +39,14 @@ def seen_from_first(poses):
 end = math.dist(seen_from_first(truth), seen_from_first(wheels))
 print("%-18s %-8s path %5.0f m  odometry's end %6.1f m  ATE %7.3f m  live %7.3f m  poses %3.0f %%  loops %4d  "
       "components %2d  %5.1f s  %s" % (name, odometry, path, end, final["ate_rmse_m"], live["ate_rmse_m"],
-      100 * final["paired_share"], summary["edges"]["loop"], summary["components"], summary["seconds"]["total"], options))
+      100 * final["paired"], summary["edges"]["loop"], summary["components"], summary["seconds"]["total"], options))
 PYTHON
   cat "$out/line"
 }
 
 if [ "${1-}" = --one ]; then
   shift
-  run_one "$@" || { echo "$1 FAILED: $(tail -n 1 "build/robust/$1/errors")" | tee "build/robust/$1/line"; }
+  run_one "$@"
   exit
 fi
 
@@ -84,7 +84,7 @@ for ((i = 0; i < ${#runs[@]}; i += 5)); do
 done
 jobs=0
 for ((i = 0; i < ${#runs[@]}; i += 5)); do
-  "$0" --one "${runs[@]:i:5}" "$@" &
+  { "$0" --one "${runs[@]:i:5}" "$@" || echo "${runs[i]} FAILED" | tee "build/robust/${runs[i]}/line"; } &
   jobs=$((jobs + 1))
   if [ $jobs -ge 2 ]; then
     wait -n
