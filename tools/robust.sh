@@ -6,7 +6,7 @@
 #             pushes, slips, kidnaps), in the offices and on the ring
 # Environment: KINDS ("offices hall corridor flat cave"; with --faults "offices ring"), SEEDS ("1 2 3 4"; with --faults
 # "1"), FAULTS ("people glass missing stops pushes slips kidnaps", with --faults).
-# Results: build/robust/NAME (log and truth in its folder sim). Two runs at a time.
+# MELLIN is the program (build/host/bin/mellin). Results: build/robust/NAME (log and truth in its folder sim). Two runs at a time.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -14,7 +14,7 @@ cd "$(dirname "$0")/.."
 run_one() {
   local name=$1 kind=$2 seed=$3 odometry=$4 options=$5
   shift 5
-  local mellin=build/host/bin/mellin out=build/robust/$name
+  local mellin=${MELLIN-build/host/bin/mellin} out=build/robust/$name
   mkdir -p "$out"
   # shellcheck disable=SC2086  # the options are words
   "$mellin" sim -o "$out/sim" --kind "$kind" --seed "$seed" --odometry "$odometry" $options >/dev/null

@@ -24,15 +24,15 @@ struct OdometryErrors {
 OdometryErrors errors_of(SimOdometry quality) {
   switch (quality) {
     case SimOdometry::good:
-      return {0.005, 0.00005, 0.005, 0.001};
+      return {0.01, 0.0002, 0.01, 0.002};
     case SimOdometry::plain:
-      return {0.02, 0.0007, 0.015, 0.004};
+      return {0.02, 0.001, 0.015, 0.005};
     case SimOdometry::slipping:
-      return {0.03, 0.002, 0.06, 0.02};
+      return {0.03, 0.001, 0.06, 0.02};
     case SimOdometry::poor:
       break;
   }
-  return {0.04, 0.005, 0.03, 0.01};
+  return {0.04, 0.003, 0.03, 0.01};
 }
 
 }  // namespace
