@@ -104,8 +104,11 @@ struct Sample {
   double depth = 0.0;
 };
 
-/// Where the depth is zero between two samples, one in the rock and one in the open.
-Point2 surface(const Sample& a, const Sample& b) { return between_points(a.at, b.at, a.depth / (a.depth - b.depth)); }
+/// Where the depth is zero between two samples, one in the rock and one in the open; the same bits for either order,
+/// so that the walls of neighbouring cells meet.
+Point2 surface(const Sample& a, const Sample& b) {
+  return a.depth > b.depth ? between_points(a.at, b.at, a.depth / (a.depth - b.depth)) : surface(b, a);
+}
 
 /// The walls in one cell (marching squares, Lorensen and Cline 1987 in the plane), corners in turn round it.
 void add_cell_walls(Floor& floor, const Sample (&corners)[4]) {
