@@ -5,8 +5,9 @@
 #   --faults: instead of the odometries, what befalls a robot and its sensor (people, glass, missing beams, stops,
 #             pushes, slips, kidnaps), in the offices and on the ring
 # Environment: KINDS ("offices hall corridor flat cave"; with --faults "offices ring"), SEEDS ("1 2 3 4"; with --faults
-# "1"), FAULTS ("people glass missing stops pushes slips kidnaps", with --faults).
-# MELLIN is the program (build/host/bin/mellin). Results: build/robust/NAME (log and truth in its folder sim). Two runs at a time.
+# "1"), FAULTS ("none people glass missing stops pushes slips kidnaps", with --faults).
+# MELLIN is the program (build/host/bin/mellin). Results: build/robust/NAME (log and truth in its folder sim). Two runs at
+# a time.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -57,13 +58,14 @@ if [ $faults = no ]; then
   odometries=(good plain poor slipping)
   spacings=(0.1 0.2 0.4 0.7 1.0)
   beams=(180 181 360 361)
-  at=0
+  declare -A place=([offices]=0 [hall]=1 [corridor]=2 [flat]=3 [cave]=4 [ring]=5)
   for kind in ${KINDS-offices hall corridor flat cave}; do
     for seed in ${SEEDS-1 2 3 4}; do
-      # 5 spacings and 4 odometries have no common factor, so that they meet in all pairs.
+      # A kind and a seed are always the same run. 5 spacings and 4 odometries have no common factor, so that over the
+      # kinds they meet in all pairs.
+      at=$((4 * place[$kind] + seed - 1))
       runs+=("$kind-$seed" "$kind" "$seed" "${odometries[(seed - 1) % 4]}"
-        "--spacing ${spacings[at % 5]} --beams ${beams[(at / 4 + seed) % 4]}")
-      at=$((at + 1))
+        "--spacing ${spacings[at % 5]} --beams ${beams[(place[$kind] + seed) % 4]}")
     done
   done
 else
