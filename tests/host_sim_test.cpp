@@ -10,68 +10,17 @@
 #include "host/simulator.hpp"
 #include "host/tum.hpp"
 #include "tests/host_support.hpp"
+#include "tests/support/simulated_world.hpp"
 
 using namespace mellin;
 using namespace mellin::host;
+using mellin::test::clearance;
+using mellin::test::cross;
+using mellin::test::exact;
+using mellin::test::odometry_of;
 using mellin::test::read_bytes;
 using mellin::test::TemporaryFolder;
-
-namespace {
-
-double distance_to(const WallSegment& wall, Point2 p) {
-  const double dx = wall.b.x - wall.a.x;
-  const double dy = wall.b.y - wall.a.y;
-  const double length2 = dx * dx + dy * dy;
-  const double along = length2 > 0.0 ? ((p.x - wall.a.x) * dx + (p.y - wall.a.y) * dy) / length2 : 0.0;
-  const double share = std::clamp(along, 0.0, 1.0);
-  return std::hypot(p.x - wall.a.x - share * dx, p.y - wall.a.y - share * dy);
-}
-
-double clearance(const std::vector<WallSegment>& walls, Point2 p) {
-  double least = 1e9;
-  for (const WallSegment& wall : walls) {
-    least = std::min(least, distance_to(wall, p));
-  }
-  return least;
-}
-
-/// Whether the open segments cross (orientation test).
-bool cross(Point2 a, Point2 b, Point2 c, Point2 d) {
-  const auto side = [](Point2 p, Point2 q, Point2 r) {
-    return (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x) > 0.0;
-  };
-  return side(a, b, c) != side(a, b, d) && side(c, d, a) != side(c, d, b);
-}
-
-std::vector<StampedPose> truth_of(const SimSession& session) {
-  std::vector<StampedPose> poses;
-  for (const SimScan& scan : session.scans) {
-    poses.push_back({"", scan.seconds, scan.world_T_base});
-  }
-  return poses;
-}
-
-std::vector<StampedPose> odometry_of(const SimSession& session) {
-  std::vector<StampedPose> poses;
-  for (const SimScan& scan : session.scans) {
-    poses.push_back({"", scan.seconds, scan.odometry_T_base});
-  }
-  return poses;
-}
-
-SimOptions exact() {
-  SimOptions options;
-  options.range_noise_m = 0.0;
-  options.no_return_share = 0.0;
-  options.outlier_share = 0.0;
-  options.scale_error = 0.0;
-  options.turn_error_rad_per_m = 0.0;
-  options.way_noise = 0.0;
-  options.turn_noise_rad = 0.0;
-  return options;
-}
-
-}  // namespace
+using mellin::test::truth_of;
 
 TEST_CASE("rays end at the nearest wall") {
   const std::vector<WallSegment> room{{{-1, -2}, {3, -2}}, {{3, -2}, {3, 2}}, {{3, 2}, {-1, 2}}, {{-1, 2}, {-1, -2}}};
@@ -269,7 +218,7 @@ TEST_CASE("the files read back as what was simulated") {
 
 TEST_CASE("options outside their limits are refused") {
   SimOptions options;
-  options.beams = 181;
+  options.beams = 182;
   CHECK_THROWS_AS((void)simulate(options, 0), std::invalid_argument);
   options = {};
   options.range_m = NAN;

@@ -35,7 +35,7 @@ inline SimulatedLog simulated_log(const host::SimOptions& options, int session =
   host::LaserSpec laser;
   laser.beams = static_cast<std::size_t>(options.beams);
   laser.angle_min_rad = -kHalfPi;
-  laser.increment_rad = options.beams == 180 ? kPi / 180.0 : kPi / 360.0;
+  laser.increment_rad = host::beam_increment(options.beams);
   laser.max_range_m = options.range_m;
   out.log.lasers.push_back(laser);
   for (const host::SimScan& scan : host::simulate(options, session).scans) {
