@@ -1,4 +1,5 @@
 // A cave: winding tunnels that meet, with walls of irregular width and not one straight line.
+#include <algorithm>
 #include <cmath>
 
 #include "host/sim_kinds.hpp"

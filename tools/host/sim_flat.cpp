@@ -1,4 +1,5 @@
 // A flat: small rooms full of furniture, with open doorways from room to room.
+#include <algorithm>
 #include <numeric>
 #include <utility>
 
@@ -46,9 +47,9 @@ void add_doorway(Floor& floor, const Partition& wall, Random& layout) {
   add_wall(floor, wall.frame, at + kDoorway_m / 2.0, 0.0, wall.length_m, 0.0);
   const int before = add_node(floor, transform(wall.frame, at, -kJamb_m));
   const int behind = add_node(floor, transform(wall.frame, at, kJamb_m));
-  floor.ways.push_back({wall.a, before, 0.0, kClear_m, Way::kNoDoor});
-  floor.ways.push_back({before, behind, 0.0, kClear_m, Way::kNoDoor});
-  floor.ways.push_back({behind, wall.b, 0.0, kClear_m, Way::kNoDoor});
+  floor.ways.push_back({wall.a, before, kSlack_m, kClear_m, Way::kNoDoor});
+  floor.ways.push_back({before, behind, kSlack_m, kClear_m, Way::kNoDoor});
+  floor.ways.push_back({behind, wall.b, kSlack_m, kClear_m, Way::kNoDoor});
 }
 
 /// Doorways in random walls, so that each room can be reached from each (Kruskal 1956), and in some more.

@@ -1,4 +1,6 @@
 // An exhibition hall: outer walls far apart, and pillars and stands between the aisles.
+#include <cmath>
+
 #include "host/sim_kinds.hpp"
 #include "host/sim_room.hpp"
 

@@ -1,4 +1,5 @@
 // A tour over the ways of a floor.
+#include <algorithm>
 #include <cmath>
 
 #include "host/sim_drive.hpp"
