@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <initializer_list>
 #include <memory>
 #include <set>
 #include <utility>
@@ -230,10 +231,13 @@ TEST_CASE("each pair that shares no scans is screened once, as it comes, and no 
   CHECK(bench.edges(EdgeKind::odometry) == 11);
 }
 
-TEST_CASE("of the pairs that look alike the best are registered, best first, one a place") {
+void check_candidates(std::uint8_t nearby) {
+  CAPTURE(nearby);
   port::HeapFlash flash({4096, 256, 256});
   CollectionConfig config;
   config.candidates = 3;
+  config.nearby_candidates = nearby;
+  config.nearby_m = 4.0F;
   config.candidate_agreement = 0.3F;
   Bench bench(flash.flash(), config);
   // Like random numbers, but a function of the pair.
@@ -246,6 +250,7 @@ TEST_CASE("of the pairs that look alike the best are registered, best first, one
     bench.insert(10 * i);
   }
   std::vector<Pair> expected;
+  int otherwise = 0;  // than without the graph
   for (std::uint32_t b = 0; b < 30; ++b) {
     std::vector<std::uint32_t> left;
     for (std::uint32_t a = 0; a < b && !shares(a, b); ++a) {
@@ -254,14 +259,22 @@ TEST_CASE("of the pairs that look alike the best are registered, best first, one
       }
     }
     for (int k = 0; k < 3 && !left.empty(); ++k) {
-      const std::uint32_t best = *std::max_element(left.begin(), left.end(), [&](std::uint32_t x, std::uint32_t y) {
+      const auto apart = [&](std::uint32_t a) { return translation(between(true_pose(a), true_pose(b))); };
+      std::uint32_t best = *std::max_element(left.begin(), left.end(), [&](std::uint32_t x, std::uint32_t y) {
         return bench.digests.agreement(x, b) < bench.digests.agreement(y, b);
       });
+      const std::uint32_t nearest = *std::min_element(
+          left.begin(), left.end(), [&](std::uint32_t x, std::uint32_t y) { return apart(x) < apart(y); });
+      if (k < nearby && apart(nearest) < 4.0) {
+        otherwise += nearest != best ? 1 : 0;
+        best = nearest;
+      }
       expected.emplace_back(best, b);
       std::erase_if(left, [&](std::uint32_t a) { return a + 3 >= best && a <= best + 3; });
     }
   }
   REQUIRE(expected.size() > 40);
+  CHECK((otherwise > 10) == (nearby > 0));
   CHECK(bench.grids.registered == expected);  // from flash, through two slots
   CHECK(bench.map.statistics().pairs_registered == expected.size());
   CHECK(bench.map.statistics().fetches_failed == 0);
@@ -271,6 +284,12 @@ TEST_CASE("of the pairs that look alike the best are registered, best first, one
       CHECK_FALSE(event.accepted);
       CHECK(event.reason == LinkReason::weak);
     }
+  }
+}
+
+TEST_CASE("of the pairs that look alike those near by the graph, then the best are registered, one a place") {
+  for (const std::uint8_t nearby : std::initializer_list<std::uint8_t>{0, 1, 2}) {
+    check_candidates(nearby);
   }
 }
 

@@ -106,6 +106,7 @@ TEST_CASE("validate() refuses each field out of its range and names it") {
       {"max_drift_m", [](Config& c) { c.submaps.max_drift_m = kNaN; }},
       {"max_drift_rad", [](Config& c) { c.submaps.max_drift_rad = -1.0F; }},
       {"drift_share", [](Config& c) { c.submaps.drift_share = kNaN; }},
+      {"nearby_m", [](Config& c) { c.collection.nearby_m = kNaN; }},
       {"smoother.reach_m", [](Config& c) { c.submaps.smoother.reach_m = 0.0F; }},
       {"smoother.point_sigma_m", [](Config& c) { c.submaps.smoother.point_sigma_m = 0.0F; }},
       {"smoother.independent_share", [](Config& c) { c.submaps.smoother.independent_share = kNaN; }},

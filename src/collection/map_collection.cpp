@@ -265,13 +265,39 @@ void MapCollection::finish_screening() {
   stage_ = Stage::screen;
 }
 
-void MapCollection::choose_candidate() {
+/// Index into the candidates; their number where there is none.
+std::size_t MapCollection::best_by_digest() const {
   std::size_t best = candidates_.size();
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
     if (best == candidates_.size() || candidates_[i].score > candidates_[best].score) {
       best = i;
     }
   }
+  return best;
+}
+
+/// The same, of the candidate that lies nearest to the new submap by the graph; none beyond nearby_m.
+std::size_t MapCollection::nearest_in_graph() const {
+  const SubmapId newest = count_ - 1;
+  std::size_t best = candidates_.size();
+  auto least = static_cast<double>(config_.nearby_m);
+  for (std::size_t i = 0; i < candidates_.size(); ++i) {
+    const SubmapId id = candidates_[i].id;
+    if (graph_.component(id) != graph_.component(newest)) {
+      continue;
+    }
+    const double distance = translation(between(graph_.pose(id), graph_.pose(newest)));
+    if (distance < least) {
+      least = distance;
+      best = i;
+    }
+  }
+  return best;
+}
+
+void MapCollection::choose_candidate() {
+  std::size_t best = registered_ < config_.nearby_candidates ? nearest_in_graph() : candidates_.size();
+  best = best == candidates_.size() ? best_by_digest() : best;
   if (best == candidates_.size() || registered_ >= config_.candidates) {
     if (evidence_) {
       begin_marginals();

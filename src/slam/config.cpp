@@ -96,6 +96,7 @@ Status validate_numbers(const Config& c, const Log& log) {
       {"smoother.step_sigma_m", c.submaps.smoother.step_sigma_m, 1e-3F, 10.0F, true, "0.001 to 10"},
       {"smoother.step_sigma_rad", c.submaps.smoother.step_sigma_rad, 1e-3F, 10.0F, true, "0.001 to 10"},
       {"min_gain_bits", c.collection.linker.min_gain_bits, 0.0F, 20.0F, true, "0 to 20"},
+      {"nearby_m", c.collection.nearby_m, 0.0F, kMuch, true, not_negative},
       {"base_m", edge.base_m, 1e-5F, kMuch, false, "at least 0.00001"},
       {"per_m", edge.per_m, 0.0F, kMuch, true, not_negative},
       {"base_rad", edge.base_rad, 1e-5F, kMuch, false, "at least 0.00001"},

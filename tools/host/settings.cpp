@@ -77,6 +77,8 @@ void visit_settings(C& c, Visit&& visit) {
   visit("registration.alignment.keep_both", c.registration.alignment.keep_both);
   visit("collection.close_loops", c.collection.close_loops);
   visit("collection.candidates", c.collection.candidates);
+  visit("collection.nearby_candidates", c.collection.nearby_candidates);
+  visit("collection.nearby_m", c.collection.nearby_m);
   visit("collection.candidate_agreement", c.collection.candidate_agreement);
   visit("collection.odometry.base_m", c.collection.odometry.base_m);
   visit("collection.odometry.per_m", c.collection.odometry.per_m);

@@ -30,6 +30,10 @@ struct CollectionConfig {
   std::uint32_t max_submaps = 512;
   std::uint16_t max_sessions = 16;
   std::uint8_t candidates = 4;        ///< of a new submap that are registered, best first, one a place
+  /// Of those, so many are taken for where the graph has them, nearest first, and not for their digests: along a
+  /// corridor all digests are alike.
+  std::uint8_t nearby_candidates = 1;
+  float nearby_m = 10.0F;             ///< between the centres of submaps that the graph may have in one place
   float candidate_agreement = 0.25F;  ///< digests must agree so well for a pair to be registered
   std::uint32_t digest_bytes = 0;     ///< of one digest, for the store
   bool close_loops = true;            ///< off: submaps are stored and linked by odometry only
@@ -205,6 +209,8 @@ class MapCollection {
   void recall_digest();
   void begin_comparison();
   void finish_screening();
+  std::size_t best_by_digest() const;
+  std::size_t nearest_in_graph() const;
   void choose_candidate();
   void step_fetch();
   void begin_registration();
