@@ -71,6 +71,7 @@ void visit_settings(C& c, Visit&& visit) {
   visit("registration.aligned", c.registration.aligned);
   visit("registration.aligned_share", c.registration.aligned_share);
   visit("registration.aligned_from", c.registration.aligned_from);
+  visit("registration.alignment.max_iterations", c.registration.alignment.max_iterations);
   visit("registration.alignment.final_m", c.registration.alignment.final_m);
   visit("registration.alignment.point_sigma_m", c.registration.alignment.point_sigma_m);
   visit("registration.alignment.max_points", c.registration.alignment.max_points);
