@@ -36,6 +36,14 @@ void visit_settings(C& c, Visit&& visit) {
   visit("mapper.noise.angle_base_rad", c.mapper.noise.angle_base_rad);
   visit("mapper.noise.angle_per_m", c.mapper.noise.angle_per_m);
   visit("mapper.noise.angle_per_rad", c.mapper.noise.angle_per_rad);
+  visit("mapper.odometry.learn_bias", c.mapper.odometry.learn_bias);
+  visit("mapper.odometry.learn_noise", c.mapper.odometry.learn_noise);
+  visit("mapper.odometry.scale_sigma", c.mapper.odometry.scale_sigma);
+  visit("mapper.odometry.angle_per_m_sigma", c.mapper.odometry.angle_per_m_sigma);
+  visit("mapper.odometry.angle_per_rad_sigma", c.mapper.odometry.angle_per_rad_sigma);
+  visit("mapper.odometry.memory_scans", c.mapper.odometry.memory_scans);
+  visit("mapper.odometry.least_noise", c.mapper.odometry.least_noise);
+  visit("mapper.odometry.most_noise", c.mapper.odometry.most_noise);
   visit("matcher.search_points", c.mapper.matcher.search_points);
   visit("matcher.search_distance_m", c.mapper.matcher.search_distance_m);
   visit("matcher.search_angle_rad", c.mapper.matcher.search_angle_rad);

@@ -24,7 +24,7 @@ struct EntropyOptions {
 };
 
 std::vector<host::ScanPose> read_poses(const host::Log& log, const std::string& path) {
-  const std::vector<host::ScanPose> poses = host::poses_of_scans(log, host::read_tum(path));
+  std::vector<host::ScanPose> poses = host::poses_of_scans(log, host::read_tum(path));
   if (poses.empty()) {
     throw std::runtime_error(path + ": expected poses at stamps of " + log.path + ", found none");
   }
