@@ -33,8 +33,8 @@ Sym3 in_series(const Sym3& w, const Sym3& a) {
   if (!invert(w + a, s)) {
     return {};
   }
-  return {w.xx - w.xx * s.xx * w.xx, -w.xx * s.xy * w.yy, -w.xx * s.xt * w.tt, w.yy - w.yy * s.yy * w.yy,
-          -w.yy * s.yt * w.tt,       w.tt - w.tt * s.tt * w.tt};
+  return {w.xx - w.xx * s.xx * w.xx, -w.xx * s.xy * w.yy, -w.xx * s.xt * w.tt,
+          w.yy - w.yy * s.yy * w.yy, -w.yy * s.yt * w.tt, w.tt - w.tt * s.tt * w.tt};
 }
 
 Sym3 prior_covariance(const OdometryModelConfig& config) {
@@ -104,7 +104,7 @@ OdometryModel::Observation OdometryModel::observe(const Pose2& matched) const {
   const Pose2& way = way_.corrected;
   const SinCos turn = sincos(way.theta);
   const Pose2 t{turn.cos * way.x + turn.sin * way.y, turn.cos * way.y - turn.sin * way.x, 0.0};
-  const double raw = 1.0 / (1.0 + bias_.scale);
+  const double raw = config_.learn_bias ? 1.0 / (1.0 + bias_.scale) : 1.0;
   const auto turning = [&](double by) { return Pose2{-0.5 * by * t.y, 0.5 * by * t.x, by}; };
   return {between(way, matched), {raw * t.x, raw * t.y, 0.0}, turning(way_.distance), turning(way_.turn)};
 }
@@ -133,10 +133,8 @@ void OdometryModel::learn(const Pose2& matched, const Sym3& scan_information) {
       mean.weight += share * share;
     }
   };
-  for (NoiseMean* mean : {&distance_, &angle_}) {
-    mean->sum *= memory();
-    mean->weight *= memory();
-  }
+  distance_.fade(memory());
+  angle_.fade(memory());
   learn_direction(distance_, seen.error.x, along, distance_variance, configured.xx);
   learn_direction(distance_, seen.error.y, across, distance_variance, configured.yy);
   learn_direction(angle_, seen.error.theta, heading, angle_variance, configured.tt);
@@ -152,12 +150,14 @@ void OdometryModel::settle(NoiseMean& mean) const {
 void OdometryModel::learn_bias(const Observation& seen, const Sym3& weights) {
   const double chi2 = quadratic_form(weights, seen.error);
   const Sym3 trusted = scale(weights, chi2 > kOutlier ? kOutlier / chi2 : 1.0);
-  const Pose2 whole{seen.error.x + bias_.scale * seen.by_scale.x + bias_.angle_per_m * seen.by_distance.x +
-                        bias_.angle_per_rad * seen.by_turn.x,
-                    seen.error.y + bias_.scale * seen.by_scale.y + bias_.angle_per_m * seen.by_distance.y +
-                        bias_.angle_per_rad * seen.by_turn.y,
-                    seen.error.theta + bias_.angle_per_m * seen.by_distance.theta +
-                        bias_.angle_per_rad * seen.by_turn.theta};
+  // The whole error of the raw odometry: what it was corrected by, too.
+  const OdometryBias applied = config_.learn_bias ? bias_ : OdometryBias{};
+  const auto whole_of = [&](double error, double by_scale, double by_distance, double by_turn) {
+    return error + applied.scale * by_scale + applied.angle_per_m * by_distance + applied.angle_per_rad * by_turn;
+  };
+  const Pose2 whole{whole_of(seen.error.x, seen.by_scale.x, seen.by_distance.x, seen.by_turn.x),
+                    whole_of(seen.error.y, seen.by_scale.y, seen.by_distance.y, seen.by_turn.y),
+                    whole_of(seen.error.theta, seen.by_scale.theta, seen.by_distance.theta, seen.by_turn.theta)};
   const Pose2 s = product(trusted, seen.by_scale);
   const Pose2 d = product(trusted, seen.by_distance);
   const Pose2 a = product(trusted, seen.by_turn);

@@ -87,6 +87,7 @@ Status validate_numbers(const Config& c, const Log& log) {
       {"search_angle_rad", mapper.matcher.search_angle_rad, 0.0F, 3.1416F, true, "0 to half a turn"},
       {"search_angle_step_rad", mapper.matcher.search_angle_step_rad, 0.001F, 3.1416F, false, "0.001 to half a turn"},
       {"scan_weight", mapper.matcher.scan_weight, 0.0F, kMuch, false, over_zero},
+      {"search_gain", mapper.matcher.search_gain, 0.0F, kMuch, true, not_negative},
       {"point_sigma_m", mapper.matcher.point_sigma_m, 1e-5F, kMuch, false, "at least 0.00001"},
       {"independent_share", mapper.matcher.independent_share, 0.0F, 1.0F, false, "over 0, at most 1"},
       {"min_inlier_share", mapper.matcher.min_inlier_share, 0.0F, 1.0F, true, "0 to 1"},

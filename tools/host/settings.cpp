@@ -50,6 +50,7 @@ void visit_settings(C& c, Visit&& visit) {
   visit("matcher.search_angle_step_rad", c.mapper.matcher.search_angle_step_rad);
   visit("matcher.max_iterations", c.mapper.matcher.max_iterations);
   visit("matcher.scan_weight", c.mapper.matcher.scan_weight);
+  visit("matcher.search_gain", c.mapper.matcher.search_gain);
   visit("matcher.point_sigma_m", c.mapper.matcher.point_sigma_m);
   visit("matcher.independent_share", c.mapper.matcher.independent_share);
   visit("matcher.min_inlier_share", c.mapper.matcher.min_inlier_share);

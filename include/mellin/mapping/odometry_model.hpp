@@ -27,12 +27,12 @@ struct MotionNoise {
 };
 
 struct OdometryModelConfig {
-  bool learn_bias = false;   ///< correct the odometry by what is known of its bias
+  bool learn_bias = true;    ///< correct the odometry by what is known of its bias
   bool learn_noise = false;  ///< scale MotionNoise by what is left of the odometry's error
   /// Deviations of the bias before anything is known. The estimate stays within three of them.
-  float scale_sigma = 0.05F;          ///< share of the way
-  float angle_per_m_sigma = 0.01F;    ///< rad of heading a metre driven; backwards it counts the other way
-  float angle_per_rad_sigma = 0.05F;  ///< share of the turn
+  float scale_sigma = 0.1F;           ///< share of the way
+  float angle_per_m_sigma = 0.05F;    ///< rad of heading a metre driven; backwards it counts the other way
+  float angle_per_rad_sigma = 0.1F;   ///< share of the turn
   /// Taken scans over which an observation fades to 1/e: wheels wear, floors change.
   std::uint16_t memory_scans = 400;
   float least_noise = 0.5F;  ///< the learnt noise is at least so many times the configured one …
@@ -66,8 +66,8 @@ class OdometryModel {
   /// A step of the odometry on the way since the last learn() or skip(), any part of the way.
   void advance(const Pose2& motion);
   /// The way since then led to `matched` by the scans (pose of its end in the frame of its beginning), with
-  /// `scan_information` of what they alone say of it, in the frame at its end (m, m, rad). Starts the next way. Outliers
-  /// (a wheel that slipped, a robot that was pushed) count the less the farther they lie off.
+  /// `scan_information` of what they alone say of it, in the frame at its end (m, m, rad). Starts the next way.
+  /// Outliers (a wheel that slipped, a robot that was pushed) count the less the farther they lie off.
   void learn(const Pose2& matched, const Sym3& scan_information);
   /// Starts the next way without having learnt of this one.
   void skip() { way_ = Way{}; }
@@ -90,6 +90,11 @@ class OdometryModel {
     double sum = 0.0;
     double weight = 0.0;
     double factor = 1.0;
+
+    void fade(double keep) {
+      sum *= keep;
+      weight *= keep;
+    }
   };
   /// An observation of one way: error of its end, and how that depends on the three parameters.
   struct Observation {
