@@ -225,6 +225,43 @@ TEST_CASE("one particle follows the truth to 2 cm over laps with bad odometry, a
   CHECK(m.mapper.statistics().unmatched == 0);
 }
 
+namespace {
+
+/// How much shorter a drive along a plain corridor comes out than its odometry, which is exact; share of it.
+double shortened(float search_gain) {
+  LaserConfig lasers[kMaxLasers];
+  lasers[0].beams = 180;
+  lasers[0].max_range_m = 12.0F;
+  ParticleMapperConfig config = mapper_config();
+  config.matcher.search_gain = search_gain;
+  std::vector<std::uint64_t> words;
+  ParticleMapper mapper(config, give<ParticleMapper>(words, config), {lasers, kMaxLasers}, 1);
+  Random random(1, 1);
+  constexpr int kScans = 80;
+  for (int i = 0; i < kScans; ++i) {
+    const Pose2 truth{-20.0 + 0.5 * i, 0.1 * std::sin(0.3 * i), 0.03 * std::cos(0.3 * i)};
+    std::vector<float> ranges = measure(test::corridor(), truth, lasers[0]);
+    for (float& range : ranges) {
+      range += 0.01F * static_cast<float>(random.normal());
+    }
+    REQUIRE(mapper.add({i, span(ranges), truth, 0}).ok());
+  }
+  // What the scans say along it is next to nothing, and so is what is claimed of the scale.
+  CHECK(std::fabs(mapper.odometry().bias().scale) < std::sqrt(mapper.odometry().bias_covariance().xx));
+  return 1.0 - translation(mapper.pose()) / (0.5 * (kScans - 1));
+}
+
+}  // namespace
+
+TEST_CASE("along a plain corridor the way is that of the odometry, unless the search runs after the map's roughness") {
+  const double held = shortened(ScanMatcherConfig{}.search_gain);
+  const double loose = shortened(0.0F);
+  CAPTURE(held);
+  CAPTURE(loose);
+  CHECK(std::fabs(held) < 0.02);
+  CHECK(loose > 2.0 * std::fabs(held));
+}
+
 TEST_CASE("the live map is that of the remembered scans, whatever came before") {
   const Drive drive(260);
   for (const std::uint16_t particles : std::initializer_list<std::uint16_t>{1, 4}) {
@@ -292,7 +329,9 @@ TEST_CASE("ten particles: the seed decides, the truth is followed all the same")
 
 TEST_CASE("bad scans are refused and change nothing; a blind laser rides on odometry") {
   const Drive drive(60);
-  Mapper m(drive, mapper_config());
+  ParticleMapperConfig config = mapper_config();
+  config.odometry.learn_bias = false;  // the ride is that of the raw odometry
+  Mapper m(drive, config);
   for (std::size_t i = 0; i < 40; ++i) {
     REQUIRE(m.mapper.add(drive.scan(i)).ok());
   }
@@ -333,6 +372,26 @@ TEST_CASE("bad scans are refused and change nothing; a blind laser rides on odom
     REQUIRE(m.mapper.add(drive.scan(i)).ok());
   }
   CHECK(translation(between(drive.truth(59), m.mapper.pose())) < 0.05);
+}
+
+TEST_CASE("a blind robot rides the better the more it has learnt of its odometry") {
+  const Drive drive(200);
+  double off[2] = {};
+  for (const bool learn : {false, true}) {
+    ParticleMapperConfig config = mapper_config();
+    config.odometry.learn_bias = learn;
+    Mapper m(drive, config);
+    const std::vector<float> blind(180, kNaN);
+    for (std::size_t i = 0; i < 200; ++i) {
+      Scan scan = drive.scan(i);
+      scan.ranges_m = i < 120 ? scan.ranges_m : span(blind);
+      REQUIRE(m.mapper.add(scan).ok());
+    }
+    off[learn ? 1 : 0] = translation(between(drive.truth(199), m.mapper.pose()));
+  }
+  CAPTURE(off[0]);
+  CAPTURE(off[1]);
+  CHECK(off[1] < 0.5 * off[0]);
 }
 
 TEST_CASE("a submap is the frozen scans rendered in one piece, whatever the bands, centred where they lie") {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "host/carmen_log.hpp"
 #include "host/scorer.hpp"
 #include "host/simulator.hpp"
 #include "host/tum.hpp"
@@ -217,6 +218,37 @@ TEST_CASE("bad input: one line on standard error, status 1, and 2 for a wrong ca
   const Outcome image = mellin_program(folder, "map " + log + " -o " + dir + " --store " + folder.path() + "/image");
   CHECK(image.status == 1);
   CHECK(read_bytes(folder.path() + "/image") == "not an image");
+}
+
+TEST_CASE("mellin entropy: the truth is as sharp as itself, and sharper than the odometry") {
+  const TemporaryFolder folder;
+  (void)write_log(folder, "short.log", kScans);
+  const std::string log = folder.path() + "/short.log", truth = folder.path() + "/sim-0.tum";
+  std::vector<host::StampedPose> odometry;
+  for (const host::LogScan& scan : host::read_carmen_log(log).scans) {
+    odometry.push_back({scan.stamp, scan.seconds, scan.odometry});
+  }
+  host::write_tum(folder.path() + "/odometry.tum", odometry);
+  const auto ratio = [&](const std::string& estimate) {
+    const std::string picture = folder.path() + "/map.png";
+    const Outcome done = mellin_program(
+        folder, "entropy " + log + " " + estimate + " --against " + truth + " --resolution 0.1 --json -o " + picture);
+    REQUIRE(done.status == 0);
+    CHECK(fs::file_size(picture) > 100);
+    const nlohmann::json json = nlohmann::json::parse(done.out);
+    CHECK(json["scans"] == kScans);
+    CHECK(json["map"]["cells"] > 1000);
+    return json["entropy_ratio"].get<double>();
+  };
+  CHECK(ratio(truth) == doctest::Approx(1.0));
+  CHECK(ratio(folder.path() + "/odometry.tum") > 1.02);
+  const Outcome text = mellin_program(folder, "entropy " + log + " " + truth);
+  CHECK(text.status == 0);
+  CHECK(text.out.find("bits a cell") != std::string::npos);
+  const Outcome strange =
+      mellin_program(folder, "entropy " + log + " " + folder.write("other.tum", "1e9 0 0 0 0 0 0 1\n"));
+  CHECK(strange.status == 1);
+  CHECK(lines_of(strange.err).size() == 1);
 }
 
 TEST_CASE("--store: a second call continues the map, and what stored.log promises is in the image") {

@@ -65,6 +65,9 @@ constexpr mellin_config c_config(mellin_profile profile) {
   }
   c.noise = {noise.distance_base_m, noise.distance_per_m, noise.distance_per_rad,
              noise.angle_base_rad,  noise.angle_per_m,    noise.angle_per_rad};
+  const OdometryModelConfig& odometry = p.mapper.odometry;
+  c.odometry = {odometry.learn_bias,        odometry.learn_noise,         odometry.memory_scans, odometry.scale_sigma,
+                odometry.angle_per_m_sigma, odometry.angle_per_rad_sigma, odometry.least_noise,  odometry.most_noise};
   c.seed = p.seed;
   c.cell_m = p.cell_m;
   c.side = p.side;
@@ -102,6 +105,9 @@ constexpr Config config_of(const mellin_config& c) {
   }
   p.mapper.noise = {c.noise.distance_base_m, c.noise.distance_per_m, c.noise.distance_per_rad,
                     c.noise.angle_base_rad,  c.noise.angle_per_m,    c.noise.angle_per_rad};
+  p.mapper.odometry = {c.odometry.learn_bias,        c.odometry.learn_noise,         c.odometry.scale_sigma,
+                       c.odometry.angle_per_m_sigma, c.odometry.angle_per_rad_sigma, c.odometry.memory_scans,
+                       c.odometry.least_noise,       c.odometry.most_noise};
   p.seed = c.seed;
   p.cell_m = c.cell_m;
   p.side = c.side;

@@ -124,6 +124,18 @@ typedef struct mellin_motion_noise {
   float angle_per_rad;     ///< heading, times a
 } mellin_motion_noise;
 
+/// What is learnt of the odometry from the scans, and what is expected of it before.
+typedef struct mellin_odometry_learning {
+  bool learn_bias;            ///< corrects the odometry by what is known of its bias
+  bool learn_noise;           ///< scales mellin_motion_noise by what is left of the odometry's error
+  uint16_t memory_scans;      ///< taken scans over which what was seen fades to 1/e; at least 2
+  float scale_sigma;          ///< deviation of the bias: share of the way, 0.00001 to 0.3
+  float angle_per_m_sigma;    ///< rad of heading a metre driven, 0.00001 to 1
+  float angle_per_rad_sigma;  ///< share of the turn, 0.00001 to 0.3
+  float least_noise;          ///< the learnt noise is at least so many times the configured one, 0.01 to 1 …
+  float most_noise;           ///< … and at most so many times, 1 to 100
+} mellin_odometry_learning;
+
 /// What firmware sets. mellin_config_init() fills in every field, so that each holds the value that counts: there is no
 /// hidden default, and 0 means 0 (a struct of zeros is refused, for it has no laser). Fields may be added in later
 /// versions; whoever starts from mellin_config_init() need not know of them.
@@ -135,6 +147,7 @@ typedef struct mellin_config {
   mellin_profile profile;                  ///< what the settings that are not here come from
   mellin_laser lasers[MELLIN_MAX_LASERS];  ///< scans name them by index; the profile has none: set `beams` of one
   mellin_motion_noise noise;               ///< how good the odometry is
+  mellin_odometry_learning odometry;       ///< what of it is learnt while mapping
   uint64_t seed;                           ///< of all random numbers
 
   // Sizes of the grids. A cell counts in 16 bits: remembered_scans times the beams of a laser is at most 65535.

@@ -47,6 +47,7 @@ ParticleMapper::ParticleMapper(const ParticleMapperConfig& config, const Memory&
       lasers_(lasers),
       scans_(scan_memory_config(config), memory.scans, lasers),
       matcher_(matcher_config(config), memory.matcher),
+      odometry_(config.odometry, config.noise),
       seed_(seed) {
   for (std::size_t p = 0; p < config.particles; ++p) {
     memory_.particles[p].grid = LiveGrid(memory.grids, p, config.side, config.cell_m);
@@ -56,6 +57,7 @@ ParticleMapper::ParticleMapper(const ParticleMapperConfig& config, const Memory&
 
 void ParticleMapper::reset(const Pose2& session_T_base) {
   scans_.clear();
+  odometry_.reset();
   best_ = 0;
   tracked_ = session_T_base;
   tracked_information_ = prior_information({});
@@ -106,14 +108,17 @@ void ParticleMapper::count_oddities(const Scan& scan) {
 }
 
 Sym3 ParticleMapper::prior_information(const Pose2& motion) const {
-  const MotionNoise& noise = config_.noise;
-  const double distance = translation(motion);
-  const double turn = magnitude(motion.theta);
-  const double along =
-      wide(noise.distance_base_m) + wide(noise.distance_per_m) * distance + wide(noise.distance_per_rad) * turn;
-  const double heading =
-      wide(noise.angle_base_rad) + wide(noise.angle_per_m) * distance + wide(noise.angle_per_rad) * turn;
-  return diagonal(1.0 / (along * along), 1.0 / (along * along), 1.0 / (heading * heading));
+  const Sym3 covariance = odometry_.covariance(motion);
+  return diagonal(1.0 / covariance.xx, 1.0 / covariance.yy, 1.0 / covariance.tt);
+}
+
+/// From the way between the last taken scan and this one, where the scans are sure of both.
+void ParticleMapper::learn_odometry(std::uint32_t number, const Sym3& scan_information) {
+  if (number == 0 || !memory_.particles[best_].matched) {
+    odometry_.skip();
+    return;
+  }
+  odometry_.learn(between(poses(best_)[(number - 1) % pose_capacity()], tracked_), scan_information);
 }
 
 Result<ScanOutcome> ParticleMapper::add(const Scan& scan) {
@@ -125,13 +130,14 @@ Result<ScanOutcome> ParticleMapper::add(const Scan& scan) {
   const bool first = scans_.end() == 0;
   const Pose2 motion = first ? Pose2{} : between(last_odometry_, scan.odom_T_base);
   const Pose2 since_taken = first ? Pose2{} : between(taken_odometry_, scan.odom_T_base);
-  const Pose2 predicted = compose(tracked_, motion);
+  const Pose2 predicted = compose(tracked_, odometry_.corrected(motion));
   if (!within_reach(predicted)) {  // odometry that jumps adds up
     ++statistics_.refused;
     ++statistics_.beyond_reach;
     return Status::bad_data;
   }
   last_odometry_ = scan.odom_T_base;
+  odometry_.advance(motion);
   scans_.stage(scan);
   count_oddities(scan);
   (void)matcher_.set_scan(scans_.ranges(scans_.end()), scans_.directions(scans_.end()),
@@ -184,8 +190,9 @@ bool ParticleMapper::take(const Pose2& predicted, const Sym3& prior) {
   tracked_ = memory_.particles[best_].pose;
   tracked_information_ = memory_.particles[best_].information;
   // Before the scan is in the map, which it would agree with by itself.
-  memory_.drifts[number % pose_capacity()] =
-      drift_left(prior_information(motion_), matcher_.scan_information(memory_.particles[best_].grid, tracked_));
+  const Sym3 seen = matcher_.scan_information(memory_.particles[best_].grid, tracked_);
+  memory_.drifts[number % pose_capacity()] = drift_left(prior_information(motion_), seen);
+  learn_odometry(number, seen);
   (void)scans_.take_staged();
   for (std::size_t p = 0; p < config_.particles; ++p) {
     remember(p, number);

@@ -319,7 +319,7 @@ MatchResult ScanMatcher::search(const LiveGrid& grid, const Pose2& prior, const 
     const Pose2 e = between(prior, m.pose);
     return static_cast<double>(config_.scan_weight * m.score) - 0.5 * quadratic_form(prior_information, e);
   };
-  return value(far) > value(near) ? far : near;
+  return value(far) > value(near) + (near.good ? static_cast<double>(config_.search_gain) : 0.0) ? far : near;
 }
 
 }  // namespace mellin

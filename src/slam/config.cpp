@@ -78,10 +78,16 @@ Status validate_numbers(const Config& c, const Log& log) {
       {"angle_base_rad", noise.angle_base_rad, 1e-5F, kMuch, false, "at least 0.00001"},
       {"angle_per_m", noise.angle_per_m, 0.0F, kMuch, true, not_negative},
       {"angle_per_rad", noise.angle_per_rad, 0.0F, kMuch, true, not_negative},
+      {"scale_sigma", mapper.odometry.scale_sigma, 1e-5F, 0.3F, false, "0.00001 to 0.3"},
+      {"angle_per_m_sigma", mapper.odometry.angle_per_m_sigma, 1e-5F, 1.0F, false, "0.00001 to 1"},
+      {"angle_per_rad_sigma", mapper.odometry.angle_per_rad_sigma, 1e-5F, 0.3F, false, "0.00001 to 0.3"},
+      {"least_noise", mapper.odometry.least_noise, 0.01F, 1.0F, false, "0.01 to 1"},
+      {"most_noise", mapper.odometry.most_noise, 1.0F, 100.0F, false, "1 to 100"},
       {"search_distance_m", mapper.matcher.search_distance_m, 0.0F, 1000.0F * c.cell_m, true, "0 to 1000 cells"},
       {"search_angle_rad", mapper.matcher.search_angle_rad, 0.0F, 3.1416F, true, "0 to half a turn"},
       {"search_angle_step_rad", mapper.matcher.search_angle_step_rad, 0.001F, 3.1416F, false, "0.001 to half a turn"},
       {"scan_weight", mapper.matcher.scan_weight, 0.0F, kMuch, false, over_zero},
+      {"search_gain", mapper.matcher.search_gain, 0.0F, kMuch, true, not_negative},
       {"point_sigma_m", mapper.matcher.point_sigma_m, 1e-5F, kMuch, false, "at least 0.00001"},
       {"independent_share", mapper.matcher.independent_share, 0.0F, 1.0F, false, "over 0, at most 1"},
       {"min_inlier_share", mapper.matcher.min_inlier_share, 0.0F, 1.0F, true, "0 to 1"},
@@ -170,6 +176,9 @@ Status validate(const Config& given, Log log) {
   }
   if (c.mapper.matcher.search_points < 1) {
     return refuse(log, "search_points", c.mapper.matcher.search_points, "at least 1");
+  }
+  if (c.mapper.odometry.memory_scans < 2) {
+    return refuse(log, "memory_scans", c.mapper.odometry.memory_scans, "at least 2");
   }
   const Status numbers = validate_numbers(c, log);
   if (numbers != Status::ok) {

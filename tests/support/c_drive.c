@@ -54,6 +54,7 @@ size_t c_drive_sizes(size_t sizes[C_DRIVE_TYPES]) {
       sizeof(mellin_profile),
       sizeof(mellin_laser),
       sizeof(mellin_motion_noise),
+      sizeof(mellin_odometry_learning),
       sizeof(mellin_config),
       sizeof(mellin_part),
       sizeof(mellin_memory_use),

@@ -27,7 +27,7 @@ mellin_status c_drive(mellin_slam* slam, const mellin_scan* scans, size_t count,
 
 /* sizeof of each type of mellin.h as the C compiler has it, in the order of the header, and the place of the last field
  * of mellin_config; returns how many. */
-enum { C_DRIVE_TYPES = 24 };
+enum { C_DRIVE_TYPES = 25 };
 size_t c_drive_sizes(size_t sizes[C_DRIVE_TYPES]);
 
 #ifdef __cplusplus

@@ -20,12 +20,7 @@ constexpr double kFreeThreshold = 0.196;
 double log_odds(double share) { return std::log((share + kSoftening) / (1.0 - share + kSoftening)); }
 
 std::uint8_t grey_of(float evidence) {
-  if (std::isnan(evidence)) {
-    return kMapUnobserved;
-  }
-  const double occupied = 1.0 / (1.0 + std::exp(-static_cast<double>(evidence)));
-  const auto grey = static_cast<std::uint8_t>(std::floor(kMapFree * (1.0 - occupied) + 0.5));
-  return grey == kMapUnobserved ? kMapUnobserved + 1 : grey;  // that grey is taken
+  return std::isnan(evidence) ? kMapUnobserved : map_grey(1.0 / (1.0 + std::exp(-static_cast<double>(evidence))));
 }
 
 /// A submap's cells by positions in the map.
@@ -57,6 +52,11 @@ void check(bool good, const std::string& what) {
 }
 
 }  // namespace
+
+std::uint8_t map_grey(double occupied) {
+  const auto grey = static_cast<std::uint8_t>(std::floor(kMapFree * (1.0 - occupied) + 0.5));
+  return grey == kMapUnobserved ? kMapUnobserved + 1 : grey;  // that grey is taken
+}
 
 void MapBounds::include(double x, double y) {
   if (empty()) {

@@ -49,6 +49,8 @@ struct MapImage {
 };
 inline constexpr std::uint8_t kMapUnobserved = 205;
 inline constexpr std::uint8_t kMapFree = 254;
+/// The grey of an observed cell that is occupied with this probability; never kMapUnobserved.
+std::uint8_t map_grey(double occupied);
 
 class MapPicture {
  public:

@@ -16,71 +16,6 @@ constexpr double kRevisitDistance_m = 3.0;
 constexpr std::size_t kRevisitGap = 60;
 constexpr std::size_t kRevisitPoses = 1500;
 
-struct Pairs {
-  std::vector<Pose2> estimate;
-  std::vector<Pose2> truth;
-};
-
-std::vector<StampedPose> by_time(std::vector<StampedPose> poses) {
-  std::stable_sort(poses.begin(), poses.end(),
-                   [](const StampedPose& a, const StampedPose& b) { return a.seconds < b.seconds; });
-  return poses;
-}
-
-/// Index of the first pose that is not earlier.
-std::size_t first_from(const std::vector<StampedPose>& sorted, double seconds) {
-  const auto found = std::lower_bound(sorted.begin(), sorted.end(), seconds,
-                                      [](const StampedPose& pose, double s) { return pose.seconds < s; });
-  return static_cast<std::size_t>(found - sorted.begin());
-}
-
-Pairs pair_by_stamp(const std::vector<StampedPose>& estimate, const std::vector<StampedPose>& truth) {
-  const std::vector<StampedPose> sorted = by_time(estimate);
-  Pairs pairs;
-  for (const StampedPose& true_pose : truth) {
-    if (sorted.empty()) {
-      break;
-    }
-    const std::size_t after = std::min(first_from(sorted, true_pose.seconds), sorted.size() - 1);
-    const std::size_t before = after == 0 ? 0 : after - 1;
-    const double to_after = std::fabs(sorted[after].seconds - true_pose.seconds);
-    const double to_before = std::fabs(sorted[before].seconds - true_pose.seconds);
-    const std::size_t best = to_after <= to_before ? after : before;
-    if (std::min(to_after, to_before) < kPairingTolerance_s) {
-      pairs.estimate.push_back(sorted[best].pose);
-      pairs.truth.push_back(true_pose.pose);
-    }
-  }
-  return pairs;
-}
-
-/// truth_T_estimate: the rigid motion that lays the estimate's positions best on the truth's (Umeyama 1991, without
-/// scale).
-Pose2 align(const Pairs& pairs) {
-  const auto n = static_cast<double>(pairs.truth.size());
-  Pose2 mean_e;
-  Pose2 mean_t;
-  for (std::size_t i = 0; i < pairs.truth.size(); ++i) {
-    mean_e.x += pairs.estimate[i].x / n;
-    mean_e.y += pairs.estimate[i].y / n;
-    mean_t.x += pairs.truth[i].x / n;
-    mean_t.y += pairs.truth[i].y / n;
-  }
-  double cross = 0.0;
-  double dot = 0.0;
-  for (std::size_t i = 0; i < pairs.truth.size(); ++i) {
-    const double ex = pairs.estimate[i].x - mean_e.x;
-    const double ey = pairs.estimate[i].y - mean_e.y;
-    const double tx = pairs.truth[i].x - mean_t.x;
-    const double ty = pairs.truth[i].y - mean_t.y;
-    cross += ex * ty - ey * tx;
-    dot += ex * tx + ey * ty;
-  }
-  const double theta = mellin::atan2(cross, dot);
-  const SinCos r = sincos(theta);
-  return {mean_t.x - (r.cos * mean_e.x - r.sin * mean_e.y), mean_t.y - (r.sin * mean_e.x + r.cos * mean_e.y), theta};
-}
-
 /// Errors of relative poses as they come.
 class ErrorList {
  public:
@@ -128,7 +63,7 @@ class ErrorList {
   std::vector<double> rotation_;
 };
 
-void score_absolute(const Pairs& pairs, TrajectoryScore& score) {
+void score_absolute(const PosePairs& pairs, TrajectoryScore& score) {
   const Pose2 truth_T_estimate = align(pairs);
   double squares = 0.0;
   double rotation_squares = 0.0;
@@ -144,7 +79,7 @@ void score_absolute(const Pairs& pairs, TrajectoryScore& score) {
   score.ate_rotation_rmse_deg = std::sqrt(rotation_squares / n) * kRadian;
 }
 
-RelativeError score_steps(const Pairs& pairs) {
+RelativeError score_steps(const PosePairs& pairs) {
   ErrorList errors;
   for (std::size_t i = 1; i < pairs.truth.size(); ++i) {
     errors.add(between(pairs.estimate[i - 1], pairs.estimate[i]), between(pairs.truth[i - 1], pairs.truth[i]));
@@ -152,7 +87,7 @@ RelativeError score_steps(const Pairs& pairs) {
   return errors.statistics();
 }
 
-RelativeError score_revisits(const Pairs& pairs) {
+RelativeError score_revisits(const PosePairs& pairs) {
   const std::size_t n = pairs.truth.size();
   const std::size_t stride = std::max<std::size_t>(1, n / kRevisitPoses);
   ErrorList errors;
@@ -174,7 +109,7 @@ bool interpolate(const std::vector<StampedPose>& sorted, double seconds, double 
     return false;
   }
   const std::size_t last = sorted.size() - 1;
-  const std::size_t after = std::min(std::max<std::size_t>(first_from(sorted, seconds), 1), last);
+  const std::size_t after = std::min(std::max<std::size_t>(first_not_before(sorted, seconds), 1), last);
   const StampedPose& a = sorted[after == 0 ? 0 : after - 1];
   const StampedPose& b = sorted[after];
   const double share = std::clamp((seconds - a.seconds) / std::max(b.seconds - a.seconds, 1e-9), 0.0, 1.0);
@@ -186,7 +121,7 @@ bool interpolate(const std::vector<StampedPose>& sorted, double seconds, double 
 }  // namespace
 
 TrajectoryScore score_trajectory(const std::vector<StampedPose>& estimate, const std::vector<StampedPose>& truth) {
-  const Pairs pairs = pair_by_stamp(estimate, truth);
+  const PosePairs pairs = pair_by_stamp(estimate, truth);
   TrajectoryScore score;
   score.paired = pairs.truth.size();
   score.paired_share = static_cast<double>(score.paired) / static_cast<double>(std::max<std::size_t>(1, truth.size()));

@@ -7,12 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "host/pairing.hpp"
 #include "host/tum.hpp"
 
 namespace mellin::host {
-
-/// Poses pair where their stamps differ by less than this, s.
-inline constexpr double kPairingTolerance_s = 1.5e-3;
 
 /// Error of relative poses e = (G_i^-1 G_j)^-1 (E_i^-1 E_j): translation |e_xy| in m, rotation |e_theta| in degrees.
 struct RelativeError {

@@ -5,20 +5,11 @@
 #include <cstdint>
 #include <vector>
 
+#include "host/cell_counts.hpp"
 #include "mellin/core/se2.hpp"
 #include "mellin/grid/submap.hpp"
 
 namespace mellin::host {
-
-/// A laser scan that knows where it was taken. Beam i points at first_rad + i * step_rad in the laser's frame; a range
-/// that is not finite, not positive or at least max_m hit nothing and is left out.
-struct PosedScan {
-  Pose2 world_T_laser;
-  std::vector<float> ranges_m;
-  double first_rad = 0.0;
-  double step_rad = 0.0;
-  double max_m = 0.0;
-};
 
 /// A submap that owns its cells.
 struct RenderedSubmap {

@@ -6,6 +6,7 @@
 
 namespace mellin::program {
 
+void add_entropy(CLI::App& app);   ///< mellin entropy
 void add_map(CLI::App& app);       ///< mellin map
 void add_match(CLI::App& app);     ///< mellin match
 void add_optimize(CLI::App& app);  ///< mellin optimize

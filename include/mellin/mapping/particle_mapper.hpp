@@ -9,19 +9,10 @@
 #include "mellin/core/random.hpp"
 #include "mellin/mapping/live_grid.hpp"
 #include "mellin/mapping/local_mapper.hpp"
+#include "mellin/mapping/odometry_model.hpp"
 #include "mellin/mapping/scan_matcher.hpp"
 
 namespace mellin {
-
-/// Odometry error of one step, as standard deviations: distance driven d [m], turn a [rad].
-struct MotionNoise {
-  float distance_base_m = 0.02F;   ///< along and across, always
-  float distance_per_m = 0.10F;    ///< along and across, times d
-  float distance_per_rad = 0.05F;  ///< along and across, times a
-  float angle_base_rad = 0.01F;    ///< heading, always
-  float angle_per_m = 0.05F;       ///< heading, times d
-  float angle_per_rad = 0.15F;     ///< heading, times a
-};
 
 struct ParticleMapperConfig {
   /// Measured on intel, fr079 and aces, one does as well as ten (the paper's number) at a twelfth of the time: within
@@ -40,6 +31,7 @@ struct ParticleMapperConfig {
   std::uint16_t max_beams = 0;          ///< of any laser
   ScanMatcherConfig matcher;
   MotionNoise noise;
+  OdometryModelConfig odometry;
 };
 
 class ParticleMapper final : public LocalMapper {
@@ -91,6 +83,8 @@ class ParticleMapper final : public LocalMapper {
   Pose2 scan_pose(std::uint32_t number) const override { return poses(best_)[number % pose_capacity()]; }
   Sym3 scan_drift(std::uint32_t number) const override { return memory_.drifts[number % pose_capacity()]; }
   const MapperStatistics& statistics() const override { return statistics_; }
+  /// What is known of the odometry by now.
+  const OdometryModel& odometry() const { return odometry_; }
 
   /// Poses lie within so much of their frame's origin: cells are counted in 32 bits. A scan whose odometry leads
   /// beyond is bad_data.
@@ -118,6 +112,7 @@ class ParticleMapper final : public LocalMapper {
   bool acceptable(const Scan& scan);
   void count_oddities(const Scan& scan);
   Sym3 prior_information(const Pose2& motion) const;
+  void learn_odometry(std::uint32_t number, const Sym3& scan_information);
   ScanUse track(const Pose2& predicted, const Sym3& prior);
   bool take(const Pose2& predicted, const Sym3& prior);
   bool propose(std::size_t index, const Pose2& predicted, const Sym3& prior);
@@ -129,6 +124,7 @@ class ParticleMapper final : public LocalMapper {
   Span<const LaserConfig> lasers_;
   ScanMemory scans_;
   ScanMatcher matcher_;
+  OdometryModel odometry_;
   std::uint64_t seed_ = 0;
   MapperStatistics statistics_;
   std::size_t best_ = 0;

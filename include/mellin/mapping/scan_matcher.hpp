@@ -22,6 +22,10 @@ struct ScanMatcherConfig {
   /// Weight of the whole scan: what it costs, in units of one half chi-squared, if every beam ends in free space. Beams
   /// of one scan share their errors, so it is far below the number of beams.
   float scan_weight = 120.0F;
+  /// By how much (units of half chi-squared, as scan_weight) what the search found has to be better than what is found
+  /// from the odometry by itself. Along a corridor every pose is as good as the next but for the roughness of the map,
+  /// and the best of many rough ones lies more often behind, where the scans before were taken: the map came out short.
+  float search_gain = 4.0F;
   /// What scan_information() takes a beam to be worth: deviation of its end from the wall it meets, and the share of
   /// the beams that count as independent (neighbours share the errors of the map that they are compared with).
   float point_sigma_m = 0.03F;
