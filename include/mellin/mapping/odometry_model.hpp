@@ -27,12 +27,14 @@ struct MotionNoise {
 };
 
 struct OdometryModelConfig {
-  bool learn_bias = true;    ///< correct the odometry by what is known of its bias
-  bool learn_noise = false;  ///< scale MotionNoise by what is left of the odometry's error
+  bool learn_bias = true;  ///< correct the odometry by what is known of its bias
+  /// Scale MotionNoise by what is left of the odometry's error. Off: the configured noise is wide on purpose, so that a
+  /// slip is found again, and with a narrower one the maps got no better.
+  bool learn_noise = false;
   /// Deviations of the bias before anything is known. The estimate stays within three of them.
-  float scale_sigma = 0.1F;           ///< share of the way
-  float angle_per_m_sigma = 0.05F;    ///< rad of heading a metre driven; backwards it counts the other way
-  float angle_per_rad_sigma = 0.1F;   ///< share of the turn
+  float scale_sigma = 0.1F;          ///< share of the way
+  float angle_per_m_sigma = 0.05F;   ///< rad of heading a metre driven; backwards it counts the other way
+  float angle_per_rad_sigma = 0.1F;  ///< share of the turn
   /// Taken scans over which an observation fades to 1/e: wheels wear, floors change.
   std::uint16_t memory_scans = 400;
   float least_noise = 0.5F;  ///< the learnt noise is at least so many times the configured one …
