@@ -36,7 +36,8 @@ Status MapCollection::begin_session(const SessionId& id) {
   return Status::ok;
 }
 
-Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, const Sym3& drift) {
+Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, const Sym3& drift,
+                                       std::uint16_t stretch) {
   if (!ready() || session_count_ == 0) {
     return Status::busy;
   }
@@ -52,7 +53,7 @@ Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, co
   }
   ++count_;
   memory_.headers[id] = header;
-  memory_.scans[id] = {session_, header.first_scan, header.scan_count};
+  memory_.scans[id] = {session_, stretch, header.first_scan, header.scan_count};
   slot_ = static_cast<SlotHandle&&>(slot);
   (void)store_->slots().assign(slot_, id);
   link_odometry(id, drift);
@@ -64,7 +65,7 @@ Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, co
 
 void MapCollection::link_odometry(SubmapId id, const Sym3& drift) {
   odometry_edge_ = kNoId;
-  if (newest_ == kNoSubmap) {
+  if (newest_ == kNoSubmap || !same_stretch(newest_, id)) {
     return;
   }
   const Result<EdgeId> edge = add_odometry_edge(newest_, id, drift);
@@ -75,7 +76,11 @@ void MapCollection::link_odometry(SubmapId id, const Sym3& drift) {
   }
 }
 
-/// The edge between two submaps of a session, as the local mapper saw them lie; `drift` is what it knows of its error.
+bool MapCollection::same_stretch(SubmapId a, SubmapId b) const {
+  return memory_.scans[a].session == memory_.scans[b].session && memory_.scans[a].stretch == memory_.scans[b].stretch;
+}
+
+/// The edge between two submaps of a stretch, as the local mapper saw them lie; `drift` is what it knows of its error.
 Result<EdgeId> MapCollection::add_odometry_edge(SubmapId a, SubmapId b, const Sym3& drift) {
   const Pose2 step = between(memory_.headers[a].session_T_submap, memory_.headers[b].session_T_submap);
   const OdometryEdgeNoise& noise = config_.odometry;

@@ -142,6 +142,22 @@ void MappingRun::drain() {
   }
 }
 
+/// The last scan begins a new stretch: those since the first one that was in doubt belong to it, and not to the last
+/// scan that was not.
+void MappingRun::rehang_doubted(MappedSession& session) {
+  const MappedSession::MappedScan first = session.scans.back();
+  const auto same_anchor = [&](const MappedSession::MappedScan& scan) {
+    return scan.anchor_scan + 1 == first.anchor_scan;
+  };
+  auto doubt = std::find_if(session.scans.begin(), session.scans.end(), [&](const MappedSession::MappedScan& scan) {
+    return same_anchor(scan) && scan.use == ScanUse::doubted;
+  });
+  for (; doubt != session.scans.end(); ++doubt) {
+    doubt->anchor_scan = first.anchor_scan;
+    doubt->anchor_T_base = between(first.session_T_base, doubt->session_T_base);
+  }
+}
+
 void MappingRun::map(const Log& log, const std::vector<std::uint8_t>& lasers,
                      const std::function<void(std::size_t)>& progress) {
   if (!sessions_.empty()) {
@@ -172,12 +188,17 @@ void MappingRun::map(const Log& log, const std::vector<std::uint8_t>& lasers,
       mapped.session_T_base = outcome.value().session_T_base;
       mapped.anchor_scan = outcome.value().anchor_scan;
       mapped.anchor_T_base = outcome.value().anchor_T_base;
+      mapped.use = outcome.value().use;
     } else if (!session.scans.empty()) {
       mapped = session.scans.back();
       mapped.stamp = in.stamp;
       mapped.seconds = in.seconds;
     }
     session.scans.push_back(mapped);
+    if (outcome.ok() && mapped.use == ScanUse::lost) {
+      ++session.lost;
+      rehang_doubted(session);
+    }
     drain();
     if (progress && i % 64 == 0) {
       progress(i);

@@ -134,8 +134,9 @@ class MapCollection {
 
   /// Takes a submap that was rendered into the slot (header without id and session) and starts to work on it; the
   /// handle is taken over. `drift` is the covariance of the submap's pose against the one before, in its own frame.
+  /// Submaps of different stretches of a session get no odometry edge between them: the robot was lost meanwhile.
   /// Returns its id. busy: step() has not finished with the one before. full: max_submaps.
-  Result<SubmapId> insert(SubmapHeader header, SlotHandle& slot, const Sym3& drift);
+  Result<SubmapId> insert(SubmapHeader header, SlotHandle& slot, const Sym3& drift, std::uint16_t stretch = 0);
 
   /// Whether step() has nothing to do.
   bool idle() const { return stage_ == Stage::idle; }
@@ -154,6 +155,8 @@ class MapCollection {
   /// The following require id < size().
   const SubmapHeader& header(SubmapId id) const { return memory_.headers[id]; }
   std::uint16_t session_of(SubmapId id) const { return memory_.scans[id].session; }
+  /// Which of the session's stretches it is of.
+  std::uint16_t stretch_of(SubmapId id) const { return memory_.scans[id].stretch; }
   /// Pose in the frame of its component.
   const Pose2& map_T_submap(SubmapId id) const { return graph_.pose(id); }
   /// Components are named by their smallest submap.
@@ -193,6 +196,7 @@ class MapCollection {
   };
 
   void run_slice();
+  bool same_stretch(SubmapId a, SubmapId b) const;
   void link_odometry(SubmapId id, const Sym3& drift);
   Result<EdgeId> add_odometry_edge(SubmapId a, SubmapId b, const Sym3& drift);
   void begin_screening();
