@@ -184,30 +184,27 @@ bool ParticleMapper::due(const Pose2& odometry) const {
          magnitude(moved.theta) >= wide(config_.take_angle_rad);
 }
 
-/// Whether a match may be relied on: a scan can fit half of a room well and contradict the other half.
-bool ParticleMapper::fits(const LiveGrid& grid, const MatchResult& match) const {
-  return match.good && !monitor_.contradicts(matcher_.compare(grid, match.pose));
-}
-
-/// The ordinary search, and the wider one where that fails. Good where the match fits().
+/// The ordinary search, and the wider one where that fails or where much speaks against what it found: a scan can fit
+/// half of a room well and contradict the other half. Good where the match can be relied on.
 MatchResult ParticleMapper::locate(const LiveGrid& grid, const Pose2& predicted, const Sym3& prior) {
   MatchResult match = matcher_.search(grid, predicted, prior);
-  if (fits(grid, match)) {
+  const MapAgreement agreement = matcher_.compare(grid, match.pose);
+  if (match.good && !monitor_.suspects(agreement)) {
     return match;
   }
   const MatchResult wider = matcher_.recover(grid, predicted, match);
-  if (fits(grid, wider)) {
+  if (wider.good && !monitor_.suspects(matcher_.compare(grid, wider.pose))) {
     ++statistics_.recovered;
     return wider;
   }
-  match.good = false;
+  match.good = match.good && !monitor_.contradicts(agreement);
   return match;
 }
 
 ScanUse ParticleMapper::track(const Pose2& predicted, const Sym3& prior) {
   const LiveGrid& grid = memory_.particles[best_].grid;
   MatchResult match = matcher_.refine(grid, predicted, predicted, prior);
-  if (!fits(grid, match)) {
+  if (!match.good || monitor_.suspects(matcher_.compare(grid, match.pose))) {
     match = locate(grid, predicted, prior);
   }
   tracked_ = match.good ? match.pose : predicted;

@@ -11,6 +11,7 @@ constexpr float kInlierField = 0.1F;       // the field beside something that wa
 constexpr std::uint16_t kFreeObservations = 3;  // of which none was a hit: surely free
 constexpr std::uint8_t kSolid = 12;             // of 15: hit at least twice, and by two beams in five
 constexpr std::uint8_t kSolidField = 204;       // the field in such a cell
+constexpr int kSomeBeams = 10;                  // one in so many says nothing against a pose
 constexpr std::int32_t kBeamEnd = 4;            // cells from a beam's end within which it may meet its wall
 
 /// The field between the centres of four cells, 0 to 1, and its slope per cell.
@@ -399,7 +400,7 @@ MatchResult ScanMatcher::recover(const LiveGrid& grid, const Pose2& prior, const
   found = refine(grid, correlate(grid, close, place, prior, weak), prior, weak);
   found.recovered = true;
   found.good = found.good && found.inlier_share >= config_.recovery_inlier_share &&
-               found.inlier_share >= ordinary.inlier_share + config_.recovery_gain;
+               found.score >= ordinary.score + config_.recovery_gain;
   return found;
 }
 
@@ -443,7 +444,7 @@ MapAgreement ScanMatcher::compare(const LiveGrid& grid, const Pose2& pose) const
     ++out.beams;
     out.agreeing = static_cast<std::uint16_t>(out.agreeing + (agrees(memory_.points[i]) ? 1 : 0));
   }
-  if (2 * out.agreeing > out.beams) {
+  if (kSomeBeams * (out.beams - out.agreeing) <= out.beams) {
     return out;
   }
   for (std::size_t i = 0; i < count_; i += stride) {

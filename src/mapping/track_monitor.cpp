@@ -7,17 +7,22 @@ constexpr std::uint16_t kFewBeams = 12;  // of the sample: too few to say anythi
 
 }  // namespace
 
-bool TrackMonitor::contradicts(const MapAgreement& agreement) const {
-  const auto beams = static_cast<float>(agreement.beams);
+bool TrackMonitor::conflict(const MapAgreement& agreement, float share) const {
   const auto known = static_cast<float>(agreement.agreeing + agreement.conflicts);
-  const auto conflicts = static_cast<float>(agreement.conflicts);
-  return config_.lost_scans > 0 && agreement.beams >= kFewBeams && conflicts >= config_.conflict_share * known &&
-         conflicts >= config_.least_share * beams;
+  return config_.lost_scans > 0 && agreement.beams >= kFewBeams && agreement.conflicts > 0 &&
+         static_cast<float>(agreement.conflicts) >= share * known;
+}
+
+bool TrackMonitor::suspects(const MapAgreement& agreement) const { return conflict(agreement, config_.suspect_share); }
+
+bool TrackMonitor::contradicts(const MapAgreement& agreement) const {
+  return conflict(agreement, config_.conflict_share) &&
+         static_cast<float>(agreement.conflicts) >= config_.least_share * static_cast<float>(agreement.beams);
 }
 
 TrackState TrackMonitor::judge(bool matched, const MapAgreement& agreement) {
-  const bool against = contradicts(agreement);
-  if (!against && (matched || doubts_ == 0)) {
+  const bool clear = matched && !suspects(agreement) && 2 * agreement.agreeing > agreement.beams;
+  if (!contradicts(agreement) && (clear || doubts_ == 0)) {
     doubts_ = 0;
     return TrackState::sure;
   }

@@ -126,7 +126,6 @@ class ParticleMapper final : public LocalMapper {
   ScanUse track(const Pose2& predicted, const Sym3& prior);
   ScanUse take(const Pose2& predicted, const Sym3& prior);
   bool due(const Pose2& odometry) const;
-  bool fits(const LiveGrid& grid, const MatchResult& match) const;
   MatchResult locate(const LiveGrid& grid, const Pose2& predicted, const Sym3& prior);
   void begin_stretch(const Pose2& session_T_base);
   void propose(std::size_t index, const Pose2& predicted, const Sym3& prior);

@@ -33,9 +33,9 @@ struct ScanMatcherConfig {
   float recovery_angle_rad = 0.7F;
   float recovery_angle_step_rad = 0.0349065850F;
   /// What it finds must be clearer than an ordinary match, since chance has more poses to choose from: so many of the
-  /// beams end near something solid, and so many more than at the pose that the ordinary search found.
+  /// beams end near something solid, and the score is better by so much.
   float recovery_inlier_share = 0.6F;
-  float recovery_gain = 0.2F;
+  float recovery_gain = 0.05F;
 };
 
 struct MatchResult {
@@ -109,8 +109,8 @@ class ScanMatcher {
   MatchResult recover(const LiveGrid& grid, const Pose2& prior, const MatchResult& ordinary) const;
 
   /// What the map says against the scan at a pose, and what for it. A beam that ends in a cell that was never observed,
-  /// on a way on which nothing solid is known, says nothing: that is new space. Where most beams agree, those that went
-  /// through something are not looked for. Cost: search_points beams, walked cell by cell within the window.
+  /// on a way on which nothing solid is known, says nothing: that is new space. Where nearly all beams agree, conflicts
+  /// are not looked for. Cost: search_points beams, walked cell by cell within the window.
   MapAgreement compare(const LiveGrid& grid, const Pose2& pose) const;
 
  private:

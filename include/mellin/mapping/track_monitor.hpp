@@ -15,9 +15,11 @@ struct TrackMonitorConfig {
   /// after the robot was carried off.
   std::uint8_t lost_scans = 4;
   /// A scan contradicts where so many of the beams that the map knows something about are in conflict with it …
-  float conflict_share = 0.6F;
+  float conflict_share = 0.35F;
   /// … which are so many of all its beams: else the map knows too little about where it looks.
-  float least_share = 0.25F;
+  float least_share = 0.12F;
+  /// Where so many are, the pose is looked for in a wider search.
+  float suspect_share = 0.1F;
 };
 
 enum class TrackState : std::uint8_t {
@@ -37,12 +39,17 @@ class TrackMonitor {
   /// Whether the scan cannot have been taken there, if the map is right.
   bool contradicts(const MapAgreement& agreement) const;
 
+  /// Whether so much speaks against the pose that a better one should be looked for.
+  bool suspects(const MapAgreement& agreement) const;
+
   /// To be told of each scan that is due to be taken and has seen something: whether it matched, and how it then goes
   /// with the map. An unmatched one that contradicts nothing is new space; but as long as there is doubt only a match
-  /// ends it, or a robot that was carried off would draw the new place beside the old one.
+  /// in which most beams agree ends it, or a robot that was carried off would draw the new place beside the old one.
   TrackState judge(bool matched, const MapAgreement& agreement);
 
  private:
+  bool conflict(const MapAgreement& agreement, float share) const;
+
   TrackMonitorConfig config_;
   std::uint8_t doubts_ = 0;  ///< scans in a row
 };
