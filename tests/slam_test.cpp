@@ -105,6 +105,7 @@ TEST_CASE("validate() refuses each field out of its range and names it") {
       {"recovery_inlier_share", [](Config& c) { c.mapper.matcher.recovery_inlier_share = 1.1F; }},
       {"recovery_gain", [](Config& c) { c.mapper.matcher.recovery_gain = -0.1F; }},
       {"conflict_share", [](Config& c) { c.mapper.monitor.conflict_share = 0.0F; }},
+      {"sure_share", [](Config& c) { c.mapper.monitor.sure_share = 2.0F; }},
       {"suspect_share", [](Config& c) { c.mapper.monitor.suspect_share = -1.0F; }},
       {"least_share", [](Config& c) { c.mapper.monitor.least_share = kNaN; }},
       {"every_scans", [](Config& c) { c.submaps.every_scans = 0; }},

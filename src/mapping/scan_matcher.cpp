@@ -404,18 +404,18 @@ MatchResult ScanMatcher::recover(const LiveGrid& grid, const Pose2& prior, const
   return found;
 }
 
-/// Whether a beam that does not end near anything solid cannot have been so, by the map. The cells at its end are left
-/// out: walls are rough there.
-bool ScanMatcher::conflicts(const LiveGrid& grid, const Ray& beam) const {
-  const CellRect window = grid.grid().window();
-  if (window.contains(beam.column_to, beam.row_to)) {
-    const std::size_t end = grid.grid().index(beam.column_to, beam.row_to);
-    if (grid.grid().cell(end).observations >= kFreeObservations && grid.field_data()[end] == 0) {
-      return true;
-    }
+bool ScanMatcher::ends_in_free(const LiveGrid& grid, const Ray& beam) const {
+  if (!grid.grid().window().contains(beam.column_to, beam.row_to)) {
+    return false;
   }
+  const std::size_t end = grid.grid().index(beam.column_to, beam.row_to);
+  return grid.grid().cell(end).observations >= kFreeObservations && grid.field_data()[end] == 0;
+}
+
+/// The cells at the beam's end are left out: walls are rough there.
+bool ScanMatcher::goes_through(const LiveGrid& grid, const Ray& beam) const {
   bool through = false;
-  visit_ray(beam, window, [&](std::int32_t column, std::int32_t row, bool /*hit*/) {
+  visit_ray(beam, grid.grid().window(), [&](std::int32_t column, std::int32_t row, bool /*hit*/) {
     const std::int32_t dc = column - beam.column_to;
     const std::int32_t dr = row - beam.row_to;
     const std::size_t at = grid.grid().index(column, row);
@@ -450,7 +450,14 @@ MapAgreement ScanMatcher::compare(const LiveGrid& grid, const Pose2& pose) const
   for (std::size_t i = 0; i < count_; i += stride) {
     const Point2f q = memory_.points[i];
     const Ray beam{cell_column(origin_), cell_row(origin_), cell_column(q), cell_row(q), true};
-    out.conflicts = static_cast<std::uint16_t>(out.conflicts + (!agrees(q) && conflicts(grid, beam) ? 1 : 0));
+    if (agrees(q)) {
+      continue;
+    }
+    if (goes_through(grid, beam)) {
+      ++out.through;
+    } else if (ends_in_free(grid, beam)) {
+      ++out.short_of;
+    }
   }
   return out;
 }

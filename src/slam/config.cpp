@@ -92,6 +92,7 @@ Status validate_numbers(const Config& c, const Log& log) {
       {"recovery_inlier_share", mapper.matcher.recovery_inlier_share, 0.0F, 1.0F, true, "0 to 1"},
       {"recovery_gain", mapper.matcher.recovery_gain, 0.0F, 1.0F, true, "0 to 1"},
       {"conflict_share", mapper.monitor.conflict_share, 0.0F, 1.0F, false, "over 0, at most 1"},
+      {"sure_share", mapper.monitor.sure_share, 0.0F, 1.0F, true, "0 to 1"},
       {"suspect_share", mapper.monitor.suspect_share, 0.0F, 1.0F, false, "over 0, at most 1"},
       {"least_share", mapper.monitor.least_share, 0.0F, 1.0F, false, "over 0, at most 1"},
       {"max_path_m", c.submaps.max_path_m, 0.0F, kMuch, false, over_zero},

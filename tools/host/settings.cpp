@@ -52,6 +52,7 @@ void visit_settings(C& c, Visit&& visit) {
   visit("matcher.recovery_gain", c.mapper.matcher.recovery_gain);
   visit("monitor.lost_scans", c.mapper.monitor.lost_scans);
   visit("monitor.conflict_share", c.mapper.monitor.conflict_share);
+  visit("monitor.sure_share", c.mapper.monitor.sure_share);
   visit("monitor.suspect_share", c.mapper.monitor.suspect_share);
   visit("monitor.least_share", c.mapper.monitor.least_share);
   visit("submaps.max_path_m", c.submaps.max_path_m);

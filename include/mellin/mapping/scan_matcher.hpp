@@ -50,9 +50,11 @@ struct MatchResult {
 
 /// How a scan at a pose goes with what the live map has observed, over a sample of its beams.
 struct MapAgreement {
-  std::uint16_t beams = 0;      ///< looked at
-  std::uint16_t agreeing = 0;   ///< end near something solid
-  std::uint16_t conflicts = 0;  ///< end where the map has observed free space only, or went through something solid
+  std::uint16_t beams = 0;     ///< looked at
+  std::uint16_t agreeing = 0;  ///< end near something solid
+  std::uint16_t short_of = 0;  ///< end where the map has observed free space only: something new, or somebody, is there
+  std::uint16_t through = 0;   ///< went through something solid
+  std::uint16_t conflicts() const { return static_cast<std::uint16_t>(short_of + through); }
 };
 
 class ScanMatcher {
@@ -131,7 +133,8 @@ class ScanMatcher {
   std::size_t search_stride() const { return (count_ + config_.search_points - 1) / config_.search_points; }
   Pose2 correlate(const LiveGrid& grid, const SearchWindow& window, const Pose2& at, const Pose2& prior,
                   const Sym3& prior_information) const;
-  bool conflicts(const LiveGrid& grid, const Ray& beam) const;
+  bool goes_through(const LiveGrid& grid, const Ray& beam) const;
+  bool ends_in_free(const LiveGrid& grid, const Ray& beam) const;
 
   ScanMatcherConfig config_;
   Memory memory_;

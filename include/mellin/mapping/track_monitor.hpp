@@ -14,11 +14,14 @@ struct TrackMonitorConfig {
   /// counts as a contradiction, and every scan is taken. More of them forgive a longer crowd, and cost as much way
   /// after the robot was carried off.
   std::uint8_t lost_scans = 4;
-  /// A scan contradicts where so many of the beams that the map knows something about are in conflict with it …
-  float conflict_share = 0.35F;
-  /// … which are so many of all its beams: else the map knows too little about where it looks.
+  /// A scan contradicts where so many of the beams that the map knows something about are in conflict with it, those
+  /// that went through something counting double …
+  float conflict_share = 0.4F;
+  /// … and so many of all its beams: else the map knows too little about where it looks.
   float least_share = 0.12F;
-  /// Where so many are, the pose is looked for in a wider search.
+  /// A doubt ends with a match at which so many beams agree.
+  float sure_share = 0.7F;
+  /// Where so many of those that the map knows are in conflict, the pose is looked for in a wider search.
   float suspect_share = 0.1F;
 };
 
@@ -44,12 +47,10 @@ class TrackMonitor {
 
   /// To be told of each scan that is due to be taken and has seen something: whether it matched, and how it then goes
   /// with the map. An unmatched one that contradicts nothing is new space; but as long as there is doubt only a match
-  /// in which most beams agree ends it, or a robot that was carried off would draw the new place beside the old one.
+  /// at which most beams agree ends it, or a robot that was carried off would draw the new place beside the old one.
   TrackState judge(bool matched, const MapAgreement& agreement);
 
  private:
-  bool conflict(const MapAgreement& agreement, float share) const;
-
   TrackMonitorConfig config_;
   std::uint8_t doubts_ = 0;  ///< scans in a row
 };
