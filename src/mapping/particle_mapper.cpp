@@ -184,10 +184,9 @@ bool ParticleMapper::due(const Pose2& odometry) const {
          magnitude(moved.theta) >= wide(config_.take_angle_rad);
 }
 
-/// The ordinary search, and the wider one where that fails or where much speaks against what it found: a scan can fit
-/// half of a room well and contradict the other half. Good where the match can be relied on.
-MatchResult ParticleMapper::locate(const LiveGrid& grid, const Pose2& predicted, const Sym3& prior) {
-  MatchResult match = matcher_.search(grid, predicted, prior);
+/// A second opinion on what the ordinary search found: the wider one, where that failed or where much speaks against
+/// its pose, for a scan can fit half of a room well and contradict the other half. Good where it can be relied on.
+MatchResult ParticleMapper::reconsidered(const LiveGrid& grid, const Pose2& predicted, const MatchResult& match) {
   const MapAgreement agreement = matcher_.compare(grid, match.pose);
   if (match.good && !monitor_.suspects(agreement)) {
     return match;
@@ -197,16 +196,18 @@ MatchResult ParticleMapper::locate(const LiveGrid& grid, const Pose2& predicted,
     ++statistics_.recovered;
     return wider;
   }
-  match.good = match.good && !monitor_.contradicts(agreement);
-  return match;
+  MatchResult relied_on = match;
+  relied_on.good = match.good && !monitor_.contradicts(agreement);
+  return relied_on;
 }
 
 ScanUse ParticleMapper::track(const Pose2& predicted, const Sym3& prior) {
   const LiveGrid& grid = memory_.particles[best_].grid;
   MatchResult match = matcher_.refine(grid, predicted, predicted, prior);
-  if (!match.good || monitor_.suspects(matcher_.compare(grid, match.pose))) {
-    match = locate(grid, predicted, prior);
+  if (!match.good) {
+    match = matcher_.search(grid, predicted, prior);
   }
+  match = reconsidered(grid, predicted, match);
   tracked_ = match.good ? match.pose : predicted;
   tracked_information_ = match.good ? match.information : prior;
   return match.good ? ScanUse::matched : ScanUse::odometry;
@@ -272,7 +273,7 @@ void ParticleMapper::propose(std::size_t index, const Pose2& predicted, const Sy
   if (config_.particles > 1 && invert(prior, covariance)) {
     start = compose(predicted, draw(covariance, random));  // the motion model
   }
-  const MatchResult match = locate(particle.grid, start, prior);
+  const MatchResult match = reconsidered(particle.grid, start, matcher_.search(particle.grid, start, prior));
   particle.matched = match.good;
   if (!match.good) {
     particle.pose = start;

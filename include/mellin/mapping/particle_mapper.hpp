@@ -126,7 +126,7 @@ class ParticleMapper final : public LocalMapper {
   ScanUse track(const Pose2& predicted, const Sym3& prior);
   ScanUse take(const Pose2& predicted, const Sym3& prior);
   bool due(const Pose2& odometry) const;
-  MatchResult locate(const LiveGrid& grid, const Pose2& predicted, const Sym3& prior);
+  MatchResult reconsidered(const LiveGrid& grid, const Pose2& predicted, const MatchResult& match);
   void begin_stretch(const Pose2& session_T_base);
   void propose(std::size_t index, const Pose2& predicted, const Sym3& prior);
   void remember(std::size_t index, std::uint32_t number);
