@@ -1,5 +1,5 @@
-// A drive on the simulated floor to which something happens: a hand, a slipping wheel, people, a failing sensor. Made by
-// editing the scans of an ordinary drive, so that the truth stays known.
+// A drive on the simulated floor to which something happens: a hand, a slipping wheel, people, a failing sensor. Made
+// by editing the scans of an ordinary drive, so that the truth stays known.
 #pragma once
 
 #include <algorithm>
@@ -25,7 +25,8 @@ class DisturbedDrive {
   /// The scan after `from` that is so far from it as the crow flies.
   std::size_t away(std::size_t from, double distance_m) const {
     std::size_t to = from;
-    while (to + 1 < scans_.size() && translation(between(scans_[from].world_T_base, scans_[to].world_T_base)) < distance_m) {
+    while (to + 1 < scans_.size() &&
+           translation(between(scans_[from].world_T_base, scans_[to].world_T_base)) < distance_m) {
       ++to;
     }
     return to;
@@ -62,8 +63,8 @@ class DisturbedDrive {
       std::vector<float>& ranges = scans_[i].ranges;
       const auto start = static_cast<std::size_t>(random.uniform() * static_cast<double>(ranges.size()));
       for (std::size_t b = 0; b < ranges.size(); ++b) {
-        const bool lost = sector ? (b + ranges.size() - start) % ranges.size() < ranges.size() / 3
-                                 : random.uniform() < 1.0 / 3.0;
+        const bool lost =
+            sector ? (b + ranges.size() - start) % ranges.size() < ranges.size() / 3 : random.uniform() < 1.0 / 3.0;
         ranges[b] = lost ? no_return_ : ranges[b];
       }
     }
