@@ -120,12 +120,12 @@ TEST_CASE("a scan that agrees ends the doubt; new space alone neither raises nor
 }
 
 TEST_CASE("what contradicts: shares of what the map knows, beams through walls twice, few beams never") {
-  const TrackMonitor monitor((TrackMonitorConfig()));  // 0.4 of the known ones, 0.12 of all
+  const TrackMonitor monitor((TrackMonitorConfig()));  // 0.3 of the known ones, 0.12 of all
   CHECK_FALSE(monitor.contradicts(agreement(0, 0, 0)));
-  CHECK(monitor.contradicts(agreement(30, 20, 0)));  // 20 of 50
-  CHECK_FALSE(monitor.contradicts(agreement(31, 19, 0)));
-  CHECK(monitor.contradicts(agreement(40, 0, 10)));  // 2 x 10 of 50
-  CHECK_FALSE(monitor.contradicts(agreement(41, 0, 9)));
+  CHECK(monitor.contradicts(agreement(34, 16, 0)));  // of 50
+  CHECK_FALSE(monitor.contradicts(agreement(36, 14, 0)));
+  CHECK(monitor.contradicts(agreement(42, 0, 8)));  // 2 x 8 of 50
+  CHECK_FALSE(monitor.contradicts(agreement(43, 0, 7)));
   CHECK_FALSE(monitor.contradicts(agreement(0, 7, 0)));  // less than 0.12 of 60
   CHECK(monitor.contradicts(agreement(0, 8, 0)));
   CHECK_FALSE(monitor.contradicts({11, 0, 5, 6}));

@@ -142,19 +142,22 @@ void MappingRun::drain() {
   }
 }
 
-/// The last scan begins a new stretch: those since the first one that was in doubt belong to it, and not to the last
-/// scan that was not.
+/// The last scan begins a new stretch. Those since the first one that was in doubt belong to it, and not to the last
+/// scan that was not; so do those right before that rode on odometry.
 void MappingRun::rehang_doubted(MappedSession& session) {
   const MappedSession::MappedScan first = session.scans.back();
-  const auto same_anchor = [&](const MappedSession::MappedScan& scan) {
+  const auto of_old_anchor = [&](const MappedSession::MappedScan& scan) {
     return scan.anchor_scan + 1 == first.anchor_scan;
   };
-  auto doubt = std::find_if(session.scans.begin(), session.scans.end(), [&](const MappedSession::MappedScan& scan) {
-    return same_anchor(scan) && scan.use == ScanUse::doubted;
+  auto from = std::find_if(session.scans.begin(), session.scans.end(), [&](const MappedSession::MappedScan& scan) {
+    return of_old_anchor(scan) && scan.use == ScanUse::doubted;
   });
-  for (; doubt != session.scans.end(); ++doubt) {
-    doubt->anchor_scan = first.anchor_scan;
-    doubt->anchor_T_base = between(first.session_T_base, doubt->session_T_base);
+  while (from != session.scans.begin() && of_old_anchor(*(from - 1)) && (from - 1)->use == ScanUse::odometry) {
+    --from;
+  }
+  for (; from != session.scans.end(); ++from) {
+    from->anchor_scan = first.anchor_scan;
+    from->anchor_T_base = between(first.session_T_base, from->session_T_base);
   }
 }
 

@@ -16,7 +16,7 @@ struct TrackMonitorConfig {
   std::uint8_t lost_scans = 4;
   /// A scan contradicts where so many of the beams that the map knows something about are in conflict with it, those
   /// that went through something counting double …
-  float conflict_share = 0.4F;
+  float conflict_share = 0.3F;
   /// … and so many of all its beams: else the map knows too little about where it looks.
   float least_share = 0.12F;
   /// A doubt ends with a match at which so many beams agree.
