@@ -74,11 +74,17 @@ void ParticleMapper::begin_stretch(const Pose2& session_T_base) {
     particle.log_weight = 0.0;
     particle.information = tracked_information_;
   }
-  // Whichever of them is the best next, it knows where the scans before were, which may still be rendered.
   for (std::size_t p = 0; p < config_.particles && scans_.end() > 0; ++p) {
-    for (std::size_t i = 0; i < pose_capacity(); ++i) {
-      poses(p)[i] = poses(best_)[i];
-    }
+    // Whichever of them is the best next, it knows where the scans before were, which may still be rendered.
+    copy_poses(best_, p);
+  }
+}
+
+void ParticleMapper::copy_poses(std::size_t from, std::size_t to) {
+  const Span<const Pose2> source = poses(from);
+  Pose2* target = poses(to).data();
+  for (const Pose2& pose : source) {
+    *target++ = pose;
   }
 }
 
@@ -359,9 +365,7 @@ void ParticleMapper::resample_if_poor() {
     dead.pose = alive.pose;
     dead.information = alive.information;
     dead.matched = alive.matched;
-    for (std::size_t i = 0; i < pose_capacity(); ++i) {
-      poses(p)[i] = poses(source)[i];
-    }
+    copy_poses(source, p);
     for (std::size_t i = 0; i < config_.remembered_scans; ++i) {
       rects(p)[i] = rects(source)[i];
     }

@@ -128,6 +128,7 @@ class ParticleMapper final : public LocalMapper {
   bool due(const Pose2& odometry) const;
   MatchResult reconsidered(const LiveGrid& grid, const Pose2& predicted, const MatchResult& match);
   void begin_stretch(const Pose2& session_T_base);
+  void copy_poses(std::size_t from, std::size_t to);
   void propose(std::size_t index, const Pose2& predicted, const Sym3& prior);
   void remember(std::size_t index, std::uint32_t number);
   void resample_if_poor();

@@ -131,7 +131,7 @@ class ScanMatcher {
     float turn_rad = 0.0F;
   };
   std::size_t search_stride() const { return (count_ + config_.search_points - 1) / config_.search_points; }
-  Pose2 correlate(const LiveGrid& grid, const SearchWindow& window, const Pose2& at, const Pose2& prior,
+  Pose2 correlate(const LiveGrid& grid, const SearchWindow& window, const Pose2& centre, const Pose2& prior,
                   const Sym3& prior_information) const;
   bool goes_through(const LiveGrid& grid, const Ray& beam) const;
   bool ends_in_free(const LiveGrid& grid, const Ray& beam) const;
