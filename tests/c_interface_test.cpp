@@ -182,6 +182,9 @@ void compare_statistics(const mellin_slam* c, const Slam& slam) {
   CHECK(have.mapper.unmatched == m.unmatched);
   CHECK(have.mapper.refused == m.refused);
   CHECK(have.mapper.resampled == m.resampled);
+  CHECK(have.mapper.recovered == m.recovered);
+  CHECK(have.mapper.doubted == m.doubted);
+  CHECK(have.mapper.lost == m.lost);
   const SlamStatistics& s = slam.statistics();
   CHECK(have.slam.submaps_due == s.submaps_due);
   CHECK(have.slam.submaps_delayed == s.submaps_delayed);

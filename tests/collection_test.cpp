@@ -170,7 +170,7 @@ struct Bench {
     REQUIRE(map.begin_session(id) == Status::ok);
   }
   /// A submap at its true pose, off by `error`; scans from `first_scan` on.
-  void insert(std::uint32_t first_scan, const Pose2& error = {}) {
+  void insert(std::uint32_t first_scan, const Pose2& error = {}, std::uint16_t stretch = 0) {
     Result<SlotHandle> slot = store->store.slots().acquire_free();
     REQUIRE(slot.ok());
     for (std::uint8_t& cell : store->store.slots().cells(slot.value())) {
@@ -181,7 +181,7 @@ struct Bench {
     header.session_T_submap = compose(error, true_pose(map.size()));
     header.first_scan = first_scan;
     header.scan_count = 40;
-    REQUIRE(map.insert(header, slot.value(), SubmapStep{}).ok());
+    REQUIRE(map.insert(header, slot.value(), SubmapStep{}, stretch).ok());
     CHECK(slot.value().empty());  // taken over
     drain();
     CHECK(store->store.slots().pinned() == 0);
@@ -403,6 +403,53 @@ TEST_CASE("a restart finds submaps, digests, sessions and edges again, also afte
       CHECK(fourth.map.map_T_submap(id).theta == poses[id].theta);
     }
   }
+}
+
+TEST_CASE("stretches of a session are components until a loop links them, and again after a restart") {
+  port::HeapFlash flash({4096, 256, 256});
+  {
+    Bench first(flash.flash());
+    first.session(7);
+    for (std::uint32_t i = 0; i < 9; ++i) {
+      first.insert(40 * i, {}, static_cast<std::uint16_t>(i / 3));
+    }
+    CHECK(first.edges(EdgeKind::odometry) == 6);
+    CHECK(first.map.graph().component_count() == 3);
+  }
+  {
+    Bench second(flash.flash());
+    REQUIRE(second.map.size() == 9);
+    CHECK(second.map.session_count() == 1);
+    CHECK(second.edges(EdgeKind::odometry) == 6);
+    CHECK(second.map.graph().component_count() == 3);
+    for (SubmapId id = 0; id < 9; ++id) {
+      CHECK(second.map.stretch_of(id) == id / 3);
+      CHECK(second.map.component(id) == id / 3 * 3);
+    }
+    second.map.begin_flush();  // writes the records anew
+    second.drain();
+  }
+  {
+    // A session's stretches count from 0: those of another one are others.
+    Bench third(flash.flash());
+    CHECK(third.map.graph().component_count() == 3);
+    CHECK(third.map.stretch_of(8) == 2);
+    third.session(8);
+    third.insert(0, {}, 0);
+    third.insert(40, {}, 1);
+    CHECK(third.map.graph().component_count() == 5);
+  }
+  port::HeapFlash other({4096, 256, 256});
+  Bench alike(other.flash());
+  alike.digests.agreement = [](std::uint32_t, std::uint32_t) { return 0.9F; };
+  alike.session(7);
+  for (std::uint32_t i = 0; i < 8; ++i) {
+    alike.insert(40 * i, {}, static_cast<std::uint16_t>(i / 4));
+  }
+  CHECK(alike.edges(EdgeKind::odometry) == 6);
+  CHECK(alike.edges(EdgeKind::loop) > 0);  // of one session
+  CHECK(alike.edges(EdgeKind::merge) == 0);
+  CHECK(alike.map.graph().component_count() == 1);
 }
 
 TEST_CASE("digests that are not held are read back before they are compared, also after a restart") {

@@ -19,7 +19,7 @@ Summary example() {
   Summary s;
   s.version = "1.2.3";
   s.config = {{"cell_m", 0.05}, {"particles", std::int64_t{10}}, {"profile", std::string("micro")}, {"blur", true}};
-  s.sessions = {{"a.log", "0000", 11, 12, 0}, {"b.log", "1111", 13, 14, 1}};
+  s.sessions = {{"a.log", "0000", 11, 12, 0, 15}, {"b.log", "1111", 13, 14, 1, 0}};
   s.components = 2;
   s.edges = {21, 22, 23, 24};
   s.pairs = {31, 32, 33, 34};
@@ -53,8 +53,8 @@ ReportData small_report() {
 TEST_CASE("summary.json has the fields that the contract names") {
   const nlohmann::json expected = nlohmann::json::parse(R"({
     "version": "1.2.3", "config": {"cell_m": 0.05, "particles": 10, "profile": "micro", "blur": true},
-    "sessions": [{"log": "a.log", "id": "0000", "scans": 11, "submaps": 12, "component": 0},
-                 {"log": "b.log", "id": "1111", "scans": 13, "submaps": 14, "component": 1}],
+    "sessions": [{"log": "a.log", "id": "0000", "scans": 11, "submaps": 12, "component": 0, "lost": 15},
+                 {"log": "b.log", "id": "1111", "scans": 13, "submaps": 14, "component": 1, "lost": 0}],
     "components": 2,
     "edges": {"odometry": 21, "loop": 22, "merge": 23, "rejected": 24},
     "pairs": {"possible": 31, "screened": 32, "registered": 33, "accepted": 34},

@@ -39,7 +39,7 @@ struct Bench {
     const auto number = static_cast<std::uint16_t>(scans.empty() ? 0 : scans.back().session + 1);
     for (std::uint32_t i = 0; i < count; ++i) {
       const NodeId id = rig.graph.add_node({5.0 * i, 0.0, 0.0}).value();
-      scans.push_back({number, i * new_scans, 40});
+      scans.push_back({number, 0, i * new_scans, 40});
       if (i > 0) {
         const Sym3 information =
             diagonal(1 / (sigma_m * sigma_m), 1 / (sigma_m * sigma_m), 1 / (sigma_rad * sigma_rad));
@@ -258,32 +258,38 @@ TEST_CASE("what is no evidence is not kept; where there is no room the worst is 
 }
 
 TEST_CASE("scans are shared within a session where the ranges overlap, and never between sessions") {
-  CHECK(share_scans({0, 0, 40}, {0, 39, 40}));
-  CHECK(share_scans({0, 39, 40}, {0, 0, 40}));
-  CHECK_FALSE(share_scans({0, 0, 40}, {0, 40, 40}));
-  CHECK_FALSE(share_scans({0, 0, 40}, {1, 0, 40}));
-  CHECK_FALSE(share_scans({0, 5, 0}, {0, 0, 40}));
+  CHECK(share_scans({0, 0, 0, 40}, {0, 0, 39, 40}));
+  CHECK(share_scans({0, 0, 39, 40}, {0, 0, 0, 40}));
+  CHECK_FALSE(share_scans({0, 0, 0, 40}, {0, 0, 40, 40}));
+  CHECK_FALSE(share_scans({0, 0, 0, 40}, {1, 0, 0, 40}));
+  CHECK_FALSE(share_scans({0, 0, 5, 0}, {0, 0, 0, 40}));
   // Numbers near their limit, as a damaged record may have them.
-  CHECK(share_scans({0, 0xFFFFFFF0U, 0x40}, {0, 0xFFFFFFF8U, 4}));
+  CHECK(share_scans({0, 0, 0xFFFFFFF0U, 0x40}, {0, 0, 0xFFFFFFF8U, 4}));
 }
 
 TEST_CASE("records of nodes and edges come back bit by bit, and garbage is refused") {
   std::uint8_t bytes[kEdgeRecordBytes];
   const Pose2 pose{1.0 / 3.0, -1e5, 3.0};
-  REQUIRE(write_node_record(pose, {bytes, sizeof bytes}) == kNodeRecordBytes);
+  REQUIRE(write_node_record({pose, 513}, {bytes, sizeof bytes}) == kNodeRecordBytes);
   // Little-endian IEEE 754 by definition: -1e5 is 0xC0F86A0000000000.
   const std::uint8_t expected[8] = {0, 0, 0, 0, 0, 0x6A, 0xF8, 0xC0};
   CHECK(std::memcmp(bytes + 8, expected, 8) == 0);
-  Pose2 back;
+  CHECK(bytes[24] == 1);
+  CHECK(bytes[25] == 2);
+  NodeRecord back;
   REQUIRE(read_node_record({bytes, kNodeRecordBytes}, back));
-  CHECK(back.x == pose.x);
-  CHECK(back.y == pose.y);
-  CHECK(back.theta == pose.theta);
+  CHECK(back.map_T_submap.x == pose.x);
+  CHECK(back.map_T_submap.y == pose.y);
+  CHECK(back.map_T_submap.theta == pose.theta);
+  CHECK(back.stretch == 513);
+  REQUIRE(read_node_record({bytes, 24}, back));  // as it was written before there were stretches
+  CHECK(back.map_T_submap.theta == pose.theta);
+  CHECK(back.stretch == 0);
   CHECK_FALSE(read_node_record({bytes, kNodeRecordBytes - 1}, back));
   CHECK_FALSE(read_node_record({bytes, kNodeRecordBytes + 1}, back));
   CHECK_FALSE(read_node_record({}, back));
   for (const double bad : {static_cast<double>(NAN), static_cast<double>(INFINITY)}) {
-    (void)write_node_record({0.0, bad, 0.0}, {bytes, sizeof bytes});
+    (void)write_node_record({{0.0, bad, 0.0}, 0}, {bytes, sizeof bytes});
     CHECK_FALSE(read_node_record({bytes, kNodeRecordBytes}, back));
   }
 

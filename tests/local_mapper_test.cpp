@@ -121,6 +121,8 @@ class FakeMapper final : public LocalMapper {
   std::uint32_t first_remembered() const override {
     return scans_.end() > remembered_ ? scans_.end() - remembered_ : 0;
   }
+  std::uint16_t stretch() const override { return 0; }
+  std::uint32_t stretch_begin() const override { return 0; }
   Pose2 scan_pose(std::uint32_t number) const override { return poses_[number]; }
   Sym3 scan_drift(std::uint32_t number) const override { return drifts_[number]; }
   const MapperStatistics& statistics() const override { return statistics_; }

@@ -22,6 +22,7 @@ struct Run {
   std::size_t loops = 0;
   std::size_t submaps = 0;
   std::size_t components = 0;
+  std::uint32_t lost = 0;
   host::RelativeError relations;
 };
 
@@ -44,6 +45,7 @@ Run map_log(const std::string& log_path, const std::string& truth_path, const st
   result.loops = run.slam().collection().statistics().pairs_accepted;
   result.submaps = run.slam().collection().size();
   result.components = run.slam().collection().graph().component_count();
+  result.lost = session.lost;
   MESSAGE(log_path, ": ", result.submaps, " submaps, ", result.loops, " loops, ATE live ", result.live.ate_rmse_m,
           " m, final ", result.last.ate_rmse_m, " m, relations ", result.relations.mean_m, " m");
   return result;
@@ -60,6 +62,7 @@ TEST_CASE("intel with the micro profile: loops are closed, and the map is right 
   CHECK(run.scans == 4544);
   CHECK(run.last.paired >= 900);
   CHECK(run.components == 1);
+  CHECK(run.lost == 0);
   CHECK(run.loops > 0);
   CHECK(run.last.ate_rmse_m < 0.5);
   CHECK(run.last.ate_rmse_m <= run.live.ate_rmse_m);
@@ -74,6 +77,25 @@ TEST_CASE("aces with the micro profile: corridors that look alike do not mislead
   }
   const Run run = map_log(log, real_data("aces.tum"), {});
   CHECK(run.components == 1);
+  CHECK(run.lost == 0);
   CHECK(run.last.paired >= 400);
   CHECK(run.last.ate_rmse_m < 0.5);
+}
+
+TEST_CASE("fr079, full of doors and people, with the nano profile's coarse cells: it never says that it is lost") {
+  const std::string log_path = real_data("fr079.log.gz");
+  if (log_path.empty() || kSanitized) {
+    return;
+  }
+  const host::Log log = host::read_carmen_log(log_path);
+  for (const Config& profile : {nano_profile(), desktop_profile()}) {
+    Config config = profile;
+    config.collection.close_loops = false;
+    const std::vector<std::uint8_t> lasers = host::add_lasers(config, log);
+    port::HeapFlash flash({});
+    host::MappingRun run(config, flash.flash(), {});
+    run.map(log, lasers, {});
+    CHECK(run.slam().mapper().statistics().lost == 0);
+    CHECK(run.slam().collection().graph().component_count() == 1);
+  }
 }

@@ -257,6 +257,8 @@ typedef enum mellin_scan_use {
   MELLIN_SCAN_TAKEN = 0,     ///< matched and added to the live map
   MELLIN_SCAN_MATCHED = 1,   ///< matched to the live map only
   MELLIN_SCAN_ODOMETRY = 2,  ///< matching failed: the pose rides on odometry from the last one
+  MELLIN_SCAN_DOUBTED = 3,   ///< contradicts the live map: not added, since the robot may not be where it seems
+  MELLIN_SCAN_LOST = 4,      ///< too many did: the live map begins afresh, in a component of its own
   MELLIN_SCAN_USE_WIDTH = 0x7FFFFFFF
 } mellin_scan_use;
 
@@ -295,7 +297,8 @@ mellin_status mellin_pose(const mellin_slam* slam, mellin_pose2* session_T_base,
 
 /// The pose in the map; it jumps when a loop closes. `component` (may be NULL) names the part of the map by its
 /// smallest submap: poses in different ones cannot be compared. MELLIN_NO_SUBMAP: the session is not linked to the map
-/// yet, it has no submap; the pose is in the session's frame. Statuses: MELLIN_OK.
+/// yet: it has no submap since it began or since the robot was lost; the pose is in the session's frame. Statuses:
+/// MELLIN_OK.
 mellin_status mellin_map_pose(const mellin_slam* slam, mellin_pose2* map_T_base, uint32_t* component);
 
 // ---- The live map: a square window of cells round the robot, in the session's frame. Cell (column, row) covers x from
@@ -386,13 +389,17 @@ typedef struct mellin_mapper_statistics {
   uint32_t unmatched;  ///< rode on odometry
   uint32_t refused;    ///< MELLIN_BAD_DATA
   uint32_t resampled;
+  uint32_t recovered;  ///< matched by the wider search only
+  uint32_t doubted;    ///< due to be taken, and not added
+  uint32_t lost;       ///< times that the live map began afresh
 } mellin_mapper_statistics;
 
 /// Of rendering, mellin::SlamStatistics. Times are by the port's clock, 0 where it has none.
 typedef struct mellin_slam_statistics {
   uint32_t submaps_due;
   uint32_t submaps_delayed;  ///< due while the one before was not finished: started later, with newer scans
-  uint32_t submaps_lost;     ///< not kept: no room in the collection, or their scans were overwritten
+  uint32_t submaps_lost;     ///< not kept: no room in the collection, their scans were overwritten, or the robot was
+                             ///< lost again after a few scans
   uint64_t mapping_us;       ///< in mellin_add()
   uint64_t rendering_us;
 } mellin_slam_statistics;

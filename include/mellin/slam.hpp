@@ -14,7 +14,8 @@ namespace mellin {
 struct SlamStatistics {
   std::uint32_t submaps_due = 0;
   std::uint32_t submaps_delayed = 0;  ///< due while the one before was not finished: started later, with newer scans
-  std::uint32_t submaps_lost = 0;     ///< not kept: no room in the collection, or their scans were overwritten
+  std::uint32_t submaps_lost = 0;     ///< not kept: no room in the collection, their scans were overwritten, or the
+                                      ///< robot was lost again after a few scans
   std::uint64_t mapping_us = 0;       ///< in add(), by the port's clock
   std::uint64_t rendering_us = 0;
   std::uint32_t clock_back = 0;  ///< times that the port's clock ran back in add() or work(); no time is then counted
@@ -22,7 +23,8 @@ struct SlamStatistics {
 
 /// Where the robot is in the map of its component.
 struct MapPose {
-  bool linked = false;  ///< false: the session has no submap yet, the pose is in the session's frame
+  bool linked = false;  ///< false: no submap yet since the session began or the robot was lost; the pose is in the
+                        ///< session's frame
   SubmapId component = kNoSubmap;
   Pose2 map_T_base;  ///< jumps when a loop closes
 };
@@ -65,7 +67,9 @@ class Slam {
 
   /// Takes the next scan. bad_data: the scan is not what the configuration says, or its odometry is not finite; it is
   /// ignored and counted, see MapperStatistics. A stamp that jumps or stands still is counted only: scans count in the
-  /// order in which they come. Cost bounded by the configuration; does no background work.
+  /// order in which they come. Cost bounded by the configuration; does no background work. A robot that finds itself
+  /// lost (ScanUse::lost) goes on in the same session, in a component of the map of its own, until a place that is
+  /// recognised links it.
   Result<ScanOutcome> add(const Scan& scan);
 
   /// Does up to `budget` slices of background work, at least one where there is any. Returns whether there is more.
@@ -109,6 +113,7 @@ class Slam {
   Status open_store();
   SessionId new_session_id();
   void freeze_if_due(bool due);
+  void forget_what_cannot_be_frozen();
   void render_slice();
   void hand_over();
   bool pending() const;

@@ -36,7 +36,8 @@ Status MapCollection::begin_session(const SessionId& id) {
   return Status::ok;
 }
 
-Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, const SubmapStep& from_before) {
+Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, const SubmapStep& from_before,
+                                       std::uint16_t stretch) {
   if (!ready() || session_count_ == 0) {
     return Status::busy;
   }
@@ -52,7 +53,7 @@ Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, co
   }
   ++count_;
   memory_.headers[id] = header;
-  memory_.scans[id] = {session_, header.first_scan, header.scan_count};
+  memory_.scans[id] = {session_, stretch, header.first_scan, header.scan_count};
   slot_ = static_cast<SlotHandle&&>(slot);
   (void)store_->slots().assign(slot_, id);
   link_odometry(id, from_before);
@@ -64,7 +65,7 @@ Result<SubmapId> MapCollection::insert(SubmapHeader header, SlotHandle& slot, co
 
 void MapCollection::link_odometry(SubmapId id, const SubmapStep& from_before) {
   odometry_edge_ = kNoId;
-  if (newest_ == kNoSubmap) {
+  if (newest_ == kNoSubmap || !same_stretch(newest_, id)) {
     return;
   }
   const bool measured = from_before.shared_scans > 0 && from_before.before_first_scan == memory_.scans[newest_].first;
@@ -77,7 +78,11 @@ void MapCollection::link_odometry(SubmapId id, const SubmapStep& from_before) {
   }
 }
 
-/// The edge between two submaps of a session, as the local mapper saw them lie; `drift` is what it knows of its error.
+bool MapCollection::same_stretch(SubmapId a, SubmapId b) const {
+  return memory_.scans[a].session == memory_.scans[b].session && memory_.scans[a].stretch == memory_.scans[b].stretch;
+}
+
+/// The edge between two submaps of a stretch, as the local mapper saw them lie; `drift` is what it knows of its error.
 Result<EdgeId> MapCollection::add_odometry_edge(SubmapId a, SubmapId b, const Pose2& step, const Sym3& drift) {
   const OdometryEdgeNoise& noise = config_.odometry;
   const double distance = translation(step);

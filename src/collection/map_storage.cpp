@@ -85,7 +85,7 @@ void MapCollection::step_store() {
 }
 
 Span<const std::uint8_t> MapCollection::node_record(SubmapId id) {
-  return memory_.record.first(write_node_record(graph_.pose(id), memory_.record));
+  return memory_.record.first(write_node_record({graph_.pose(id), memory_.scans[id].stretch}, memory_.record));
 }
 
 Span<const std::uint8_t> MapCollection::edge_record(EdgeId id) {
@@ -179,24 +179,25 @@ void MapCollection::restore_submap() {
   }
   const SubmapId id = count_;
   const Result<SubmapHeader> header = store_->header(id);
-  Pose2 pose;
+  NodeRecord node_record;
   const Result<std::size_t> record = store_->read_blob(kNodeRecord, id, memory_.record);
   if (header.status() == Status::device_error || record.status() == Status::device_error) {
     restore_failed(Status::device_error);
     return;
   }
-  const bool whole = header.ok() && record.ok() && read_node_record(memory_.record.first(record.value()), pose);
+  const bool whole = header.ok() && record.ok() && read_node_record(memory_.record.first(record.value()), node_record);
   if (!whole) {
     restore_gap();
     return;
   }
-  const Result<NodeId> node = graph_.add_node(pose);
+  const Result<NodeId> node = graph_.add_node(node_record.map_T_submap);
   if (!node.ok()) {
     restore_failed(node.status());
     return;
   }
   memory_.headers[id] = header.value();
-  memory_.scans[id] = {session_index(header.value().session), header.value().first_scan, header.value().scan_count};
+  memory_.scans[id] = {session_index(header.value().session), node_record.stretch, header.value().first_scan,
+                       header.value().scan_count};
   ++count_;
   if (!digests_->holds_digests()) {
     return;  // it is read when it is compared
@@ -225,12 +226,13 @@ void MapCollection::restore_gap() {
     return;
   }
   memory_.headers[id] = header;
-  memory_.scans[id] = {id > 0 ? memory_.scans[id - 1].session : std::uint16_t{0}, header.first_scan, 0};
+  memory_.scans[id] = id > 0 ? memory_.scans[id - 1] : NodeScans{};
+  memory_.scans[id].count = 0;
   ++count_;
   ++statistics_.submaps_missing;
 }
 
-/// Links the submaps of a session across what is missing between them: a submap, or an edge whose older end was not
+/// Links the submaps of a stretch across what is missing between them: a submap, or an edge whose older end was not
 /// known to be stored. At most one visit of all edges for each submap, and mostly one visit in all.
 void MapCollection::bridge_gaps() {
   std::uint32_t odometry_edges = 0;
@@ -247,7 +249,7 @@ void MapCollection::bridge_gaps() {
     if (memory_.scans[id].count == 0) {
       continue;
     }
-    if (!whole && last != kNoSubmap && memory_.scans[last].session == memory_.scans[id].session) {
+    if (!whole && last != kNoSubmap && same_stretch(last, id)) {
       (void)add_odometry_edge(last, id, session_step(last, id), {});
     }
     last = id;
@@ -298,11 +300,11 @@ void MapCollection::restore_pose() {
   // Edges that linked components have moved nodes; the stored poses are the optimised ones.
   const SubmapId id = record_++;
   const Result<std::size_t> record = store_->read_blob(kNodeRecord, id, memory_.record);
-  Pose2 pose;
+  NodeRecord node;
   if (record.status() == Status::device_error) {
     restore_failed(Status::device_error);
-  } else if (record.ok() && read_node_record(memory_.record.first(record.value()), pose)) {
-    (void)graph_.set_pose(id, pose);
+  } else if (record.ok() && read_node_record(memory_.record.first(record.value()), node)) {
+    (void)graph_.set_pose(id, node.map_T_submap);
   }
 }
 

@@ -35,20 +35,24 @@ double get_double(const std::uint8_t* at) {
 
 }  // namespace
 
-std::size_t write_node_record(const Pose2& map_T_submap, Span<std::uint8_t> out) {
+std::size_t write_node_record(const NodeRecord& node, Span<std::uint8_t> out) {
   assert(out.size() >= kNodeRecordBytes);
-  std::uint8_t* at = put_double(out.data(), map_T_submap.x);
-  at = put_double(at, map_T_submap.y);
-  (void)put_double(at, map_T_submap.theta);
+  std::uint8_t* at = put_double(out.data(), node.map_T_submap.x);
+  at = put_double(at, node.map_T_submap.y);
+  at = put_double(at, node.map_T_submap.theta);
+  (void)put_bytes(at, node.stretch, 2);
   return kNodeRecordBytes;
 }
 
-bool read_node_record(Span<const std::uint8_t> bytes, Pose2& map_T_submap) {
-  if (bytes.size() != kNodeRecordBytes) {
+bool read_node_record(Span<const std::uint8_t> bytes, NodeRecord& node) {
+  constexpr std::size_t kPoseBytes = 24;
+  if (bytes.size() != kNodeRecordBytes && bytes.size() != kPoseBytes) {
     return false;
   }
-  map_T_submap = {get_double(bytes.data()), get_double(bytes.data() + 8), get_double(bytes.data() + 16)};
-  return is_finite(map_T_submap);
+  node.map_T_submap = {get_double(bytes.data()), get_double(bytes.data() + 8), get_double(bytes.data() + 16)};
+  node.stretch = bytes.size() == kPoseBytes ? std::uint16_t{0}
+                                            : static_cast<std::uint16_t>(get_bytes(bytes.data() + kPoseBytes, 2));
+  return is_finite(node.map_T_submap);
 }
 
 std::size_t write_edge_record(const Edge& edge, Span<std::uint8_t> out) {

@@ -48,6 +48,7 @@ ParticleMapper::ParticleMapper(const ParticleMapperConfig& config, const Memory&
       scans_(scan_memory_config(config), memory.scans, lasers),
       matcher_(matcher_config(config), memory.matcher),
       odometry_(config.odometry, config.noise),
+      monitor_(config.monitor),
       seed_(seed) {
   for (std::size_t p = 0; p < config.particles; ++p) {
     memory_.particles[p].grid = LiveGrid(memory.grids, p, config.side, config.cell_m);
@@ -58,7 +59,15 @@ ParticleMapper::ParticleMapper(const ParticleMapperConfig& config, const Memory&
 void ParticleMapper::reset(const Pose2& session_T_base) {
   scans_.clear();
   odometry_.reset();
+  stretch_ = 0;
   best_ = 0;
+  begin_stretch(session_T_base);
+}
+
+/// An empty live map, with the robot at the given pose of the session's frame.
+void ParticleMapper::begin_stretch(const Pose2& session_T_base) {
+  stretch_begin_ = scans_.end();
+  monitor_.reset();
   tracked_ = session_T_base;
   tracked_information_ = prior_information({});
   for (Particle& particle : memory_.particles) {
@@ -66,6 +75,18 @@ void ParticleMapper::reset(const Pose2& session_T_base) {
     particle.pose = session_T_base;
     particle.log_weight = 0.0;
     particle.information = tracked_information_;
+  }
+  for (std::size_t p = 0; p < config_.particles && scans_.end() > 0; ++p) {
+    // Whichever of them is the best next, it knows where the scans before were, which may still be rendered.
+    copy_poses(best_, p);
+  }
+}
+
+void ParticleMapper::copy_poses(std::size_t from, std::size_t to) {
+  const Span<const Pose2> source = poses(from);
+  Pose2* target = poses(to).data();
+  for (const Pose2& pose : source) {
+    *target++ = pose;
   }
 }
 
@@ -130,6 +151,7 @@ Result<ScanOutcome> ParticleMapper::add(const Scan& scan) {
   const bool first = scans_.end() == 0;
   const Pose2 motion = first ? Pose2{} : between(last_odometry_, scan.odom_T_base);
   const Pose2 since_taken = first ? Pose2{} : between(taken_odometry_, scan.odom_T_base);
+  const std::uint32_t taken_before = scans_.end();
   const Pose2 predicted = compose(tracked_, odometry_.corrected(motion));
   if (!within_reach(predicted)) {  // odometry that jumps adds up
     ++statistics_.refused;
@@ -143,24 +165,52 @@ Result<ScanOutcome> ParticleMapper::add(const Scan& scan) {
   (void)matcher_.set_scan(scans_.ranges(scans_.end()), scans_.directions(scans_.end()),
                           lasers_[scan.laser].base_T_laser, config_.cell_m);
 
-  ScanOutcome outcome;
-  outcome.taken = first || translation(since_taken) >= wide(config_.take_distance_m) ||
-                  magnitude(since_taken.theta) >= wide(config_.take_angle_rad);
   // The matches on the way from the last taken scan leaned on the odometry, too: it errs over the whole way.
   const Sym3 prior = prior_information(since_taken);
-  if (outcome.taken) {
-    taken_odometry_ = scan.odom_T_base;
+  ScanOutcome outcome;
+  if (due(scan.odom_T_base)) {
+    due_odometry_ = scan.odom_T_base;
     motion_ = since_taken;
-    outcome.use = take(predicted, prior) ? ScanUse::taken : ScanUse::odometry;
-    ++statistics_.taken;
+    outcome.use = take(predicted, prior);
   } else {
     outcome.use = track(predicted, prior);
   }
+  outcome.taken = scans_.end() > taken_before;
+  if (outcome.taken) {
+    taken_odometry_ = scan.odom_T_base;
+    ++statistics_.taken;
+  }
   statistics_.unmatched += outcome.use == ScanUse::odometry ? 1U : 0U;
+  statistics_.doubted += outcome.use == ScanUse::doubted ? 1U : 0U;
+  statistics_.lost += outcome.use == ScanUse::lost ? 1U : 0U;
   outcome.session_T_base = tracked_;
   outcome.anchor_scan = scans_.end() - 1;
   outcome.anchor_T_base = between(scan_pose(outcome.anchor_scan), tracked_);
   return outcome;
+}
+
+/// Whether a scan with this odometry is to be taken.
+bool ParticleMapper::due(const Pose2& odometry) const {
+  const Pose2 moved = between(due_odometry_, odometry);
+  return scans_.end() == 0 || translation(moved) >= wide(config_.take_distance_m) ||
+         magnitude(moved.theta) >= wide(config_.take_angle_rad);
+}
+
+/// A second opinion on what the ordinary search found: the wider one, where that failed or where much speaks against
+/// its pose, for a scan can fit half of a room well and contradict the other half. Good where it can be relied on.
+MatchResult ParticleMapper::reconsidered(const LiveGrid& grid, const Pose2& predicted, const MatchResult& match) {
+  const MapAgreement agreement = matcher_.compare(grid, match.pose);
+  if (match.good && !monitor_.suspects(agreement)) {
+    return match;
+  }
+  const MatchResult wider = matcher_.recover(grid, predicted, match);
+  if (wider.good && !monitor_.suspects(matcher_.compare(grid, wider.pose))) {
+    ++statistics_.recovered;
+    return wider;
+  }
+  MatchResult relied_on = match;
+  relied_on.good = match.good && !monitor_.contradicts(agreement);
+  return relied_on;
 }
 
 ScanUse ParticleMapper::track(const Pose2& predicted, const Sym3& prior) {
@@ -169,47 +219,70 @@ ScanUse ParticleMapper::track(const Pose2& predicted, const Sym3& prior) {
   if (!match.good) {
     match = matcher_.search(grid, predicted, prior);
   }
+  match = reconsidered(grid, predicted, match);
   tracked_ = match.good ? match.pose : predicted;
   tracked_information_ = match.good ? match.information : prior;
   return match.good ? ScanUse::matched : ScanUse::odometry;
 }
 
-bool ParticleMapper::take(const Pose2& predicted, const Sym3& prior) {
+ScanUse ParticleMapper::take(const Pose2& predicted, const Sym3& prior) {
   const std::uint32_t number = scans_.end();
+  const bool first = number == 0;
+  if (matcher_.points() == 0 && !first) {
+    tracked_ = predicted;  // nothing to add: the live map keeps the scans that it has
+    tracked_information_ = prior;
+    return ScanUse::odometry;
+  }
   const Pose2 best_before = memory_.particles[best_].pose;
-  bool any_matched = number == 0;
   for (std::size_t p = 0; p < config_.particles; ++p) {
     // What was learnt of the motion between the taken scans holds for every particle.
     const Pose2 own = p == best_ ? predicted : compose(memory_.particles[p].pose, between(best_before, predicted));
-    any_matched |= propose(p, own, prior);
+    propose(p, own, prior);
   }
   best_ = 0;
   for (std::size_t p = 1; p < config_.particles; ++p) {
     best_ = memory_.particles[p].log_weight > memory_.particles[best_].log_weight ? p : best_;
   }
-  tracked_ = memory_.particles[best_].pose;
-  tracked_information_ = memory_.particles[best_].information;
+  const Particle& best = memory_.particles[best_];
+  tracked_ = best.pose;
+  tracked_information_ = best.information;
+  const TrackState state =
+      first ? TrackState::sure : monitor_.judge(best.matched, matcher_.compare(best.grid, tracked_));
+  if (state == TrackState::doubted) {
+    memory_.particles[best_].pose = predicted;
+    tracked_ = predicted;
+    tracked_information_ = prior;
+    return ScanUse::doubted;
+  }
+  if (state == TrackState::lost) {
+    ++stretch_;
+    begin_stretch(predicted);
+  }
   // Before the scan is in the map, which it would agree with by itself.
-  const Sym3 seen = matcher_.scan_information(memory_.particles[best_].grid, tracked_);
+  const Sym3 seen = matcher_.scan_information(best.grid, tracked_);
   memory_.drifts[number % pose_capacity()] = drift_left(prior_information(motion_), seen);
-  learn_odometry(number, seen);
+  if (state == TrackState::lost) {
+    odometry_.skip();
+  } else {
+    learn_odometry(number, seen);
+  }
   (void)scans_.take_staged();
   for (std::size_t p = 0; p < config_.particles; ++p) {
     remember(p, number);
   }
-  const bool matched = any_matched && (number == 0 || memory_.particles[best_].matched);
+  const bool matched = first || best.matched;
   if (config_.particles > 1) {
     resample_if_poor();
   }
-  return matched;
+  return state == TrackState::lost ? ScanUse::lost : matched ? ScanUse::taken : ScanUse::odometry;
 }
 
-bool ParticleMapper::propose(std::size_t index, const Pose2& predicted, const Sym3& prior) {
+void ParticleMapper::propose(std::size_t index, const Pose2& predicted, const Sym3& prior) {
   Particle& particle = memory_.particles[index];
   particle.matched = false;
   if (scans_.end() == 0) {
     particle.pose = predicted;
-    return true;
+    return;
   }
   Random random(seed_, std::uint64_t{scans_.end()} * config_.particles + index);
   Sym3 covariance;
@@ -217,13 +290,13 @@ bool ParticleMapper::propose(std::size_t index, const Pose2& predicted, const Sy
   if (config_.particles > 1 && invert(prior, covariance)) {
     start = compose(predicted, draw(covariance, random));  // the motion model
   }
-  const MatchResult match = matcher_.search(particle.grid, start, prior);
+  const MatchResult match = reconsidered(particle.grid, start, matcher_.search(particle.grid, start, prior));
   particle.matched = match.good;
   if (!match.good) {
     particle.pose = start;
     particle.information = prior;
     particle.log_weight += wide(config_.matcher.scan_weight * match.score);
-    return false;
+    return;
   }
   particle.pose = match.pose;
   particle.information = match.information;
@@ -232,9 +305,8 @@ bool ParticleMapper::propose(std::size_t index, const Pose2& predicted, const Sy
     const double spread = wide(config_.proposal_spread);
     particle.pose = compose(match.pose, draw(scale(covariance, spread * spread), random));
   }
-  const Pose2 off = between(predicted, match.pose);
+  const Pose2 off = match.recovered ? Pose2{} : between(predicted, match.pose);
   particle.log_weight += wide(config_.matcher.scan_weight * match.score) - 0.5 * quadratic_form(prior, off);
-  return true;
 }
 
 void ParticleMapper::remember(std::size_t index, std::uint32_t number) {
@@ -242,7 +314,7 @@ void ParticleMapper::remember(std::size_t index, std::uint32_t number) {
   const Span<Pose2> scan_poses = poses(index);
   const Span<CellRect> scan_rects = rects(index);
   const std::uint32_t k = config_.remembered_scans;
-  if (number >= k) {
+  if (number >= stretch_begin_ + k) {
     const std::uint32_t oldest = number - k;
     particle.grid.remove(scans_, oldest, scan_poses[oldest % pose_capacity()], scan_rects[oldest % k]);
   }
@@ -304,9 +376,7 @@ void ParticleMapper::resample_if_poor() {
     dead.pose = alive.pose;
     dead.information = alive.information;
     dead.matched = alive.matched;
-    for (std::size_t i = 0; i < pose_capacity(); ++i) {
-      poses(p)[i] = poses(source)[i];
-    }
+    copy_poses(source, p);
     for (std::size_t i = 0; i < config_.remembered_scans; ++i) {
       rects(p)[i] = rects(source)[i];
     }

@@ -5,8 +5,16 @@
 namespace mellin {
 namespace {
 
-constexpr std::int32_t kSearchStep = 2;  // cells: within the reach of the field
-constexpr float kInlierField = 0.1F;     // the field beside something that was hit a few times
+constexpr std::int32_t kSearchStep = 2;    // cells: within the reach of the field
+constexpr std::int32_t kRecoveryStep = 3;  // cells: the nearest pose tried is within the reach of the field
+constexpr int kRecoveryFiner = 4;          // steps of heading in one of the first search's, once it has found a place
+constexpr float kInlierField = 0.1F;       // the field beside something that was hit a few times
+
+constexpr std::uint16_t kFreeObservations = 3;  // of which none was a hit: surely free
+constexpr std::uint8_t kSolid = 12;             // of 15: hit at least twice, and by two beams in five
+constexpr std::uint8_t kSolidField = 204;       // the field in such a cell
+constexpr int kSomeBeams = 10;                  // one in so many says nothing against a pose
+constexpr std::int32_t kBeamEnd = 4;            // cells from a beam's end within which it may meet its wall
 
 /// The field between the centres of four cells, 0 to 1, and its slope per cell.
 struct Sample {
@@ -74,6 +82,7 @@ std::size_t ScanMatcher::set_scan(Span<const StoredRange> ranges, Span<const Poi
   const float mount_x = static_cast<float>(base_T_laser.x) * inverse_cell;
   const float mount_y = static_cast<float>(base_T_laser.y) * inverse_cell;
   const float step = kRangeStep_m * inverse_cell;
+  origin_ = {mount_x, mount_y};
   for (std::size_t i = 0; i < ranges.size() && count_ < memory_.points.size(); ++i) {
     if (ranges[i] != 0) {
       const float length = static_cast<float>(ranges[i]) * step;
@@ -265,36 +274,38 @@ ScanMatcher::SearchPoints ScanMatcher::place_points(const LiveGrid& grid, const 
   return placed;
 }
 
-Pose2 ScanMatcher::correlate(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const {
-  const float cell = grid.cell_m();
-  const GridPose at = grid_pose(prior, cell);
-  const auto reach = static_cast<std::int32_t>(config_.search_distance_m / cell) / kSearchStep;
-  const auto turns = static_cast<std::int32_t>(config_.search_angle_rad / config_.search_angle_step_rad);
+/// The pose of the window round `centre` that fits scan and prior best.
+Pose2 ScanMatcher::correlate(const LiveGrid& grid, const SearchWindow& window, const Pose2& centre, const Pose2& prior,
+                             const Sym3& prior_information) const {
   if (count_ == 0 || config_.search_points == 0) {
-    return prior;
+    return centre;
   }
-  const std::size_t stride = (count_ + config_.search_points - 1) / config_.search_points;
+  const float cell = grid.cell_m();
+  const GridPose at = grid_pose(centre, cell);
+  const std::size_t stride = search_stride();
   const std::size_t used = (count_ + stride - 1) / stride;
   const auto per_point = static_cast<double>(config_.scan_weight) / static_cast<double>(used * 255);
   const Sym3 stiffness = rotate(prior_information, prior.theta);
-  const auto step_m = static_cast<double>(kSearchStep) * static_cast<double>(cell);
+  const Pose2 off{centre.x - prior.x, centre.y - prior.y, wrap_angle(centre.theta - prior.theta)};
+  const auto step_m = static_cast<double>(window.step) * static_cast<double>(cell);
   const std::uint8_t* const field = grid.field_data();
   double best = -1e300;
-  Pose2 best_pose = prior;
-  for (std::int32_t turn = -turns; turn <= turns; ++turn) {
-    const auto theta = static_cast<float>(turn) * config_.search_angle_step_rad;
-    const SearchPoints placed = place_points(grid, at, theta, stride, kSearchStep * reach);
-    for (std::int32_t dy = -reach; dy <= reach; ++dy) {
-      for (std::int32_t dx = -reach; dx <= reach; ++dx) {
+  Pose2 best_pose = centre;
+  for (std::int32_t turn = -window.turns; turn <= window.turns; ++turn) {
+    const auto theta = static_cast<float>(turn) * window.turn_rad;
+    const SearchPoints placed = place_points(grid, at, theta, stride, window.step * window.reach);
+    for (std::int32_t dy = -window.reach; dy <= window.reach; ++dy) {
+      for (std::int32_t dx = -window.reach; dx <= window.reach; ++dx) {
         // The prior's share first: it bounds what this pose can reach.
-        const double penalty = 0.5 * quadratic_form(stiffness, {dx * step_m, dy * step_m, static_cast<double>(theta)});
+        const double penalty = 0.5 * quadratic_form(stiffness, {off.x + dx * step_m, off.y + dy * step_m,
+                                                                off.theta + static_cast<double>(theta)});
         if (static_cast<double>(config_.scan_weight) - penalty <= best) {
           continue;
         }
-        const std::int32_t column = at.column + kSearchStep * dx;
-        const std::int32_t row = at.row + kSearchStep * dy;
+        const std::int32_t column = at.column + window.step * dx;
+        const std::int32_t row = at.row + window.step * dy;
         std::uint32_t sum = 0;
-        const std::ptrdiff_t shift = kSearchStep * (static_cast<std::ptrdiff_t>(dy) * grid.grid().side() + dx);
+        const std::ptrdiff_t shift = window.step * (static_cast<std::ptrdiff_t>(dy) * grid.grid().side() + dx);
         for (std::size_t i = 0; i < placed.direct; ++i) {
           sum += field[static_cast<std::ptrdiff_t>(memory_.indices[i]) + shift];
         }
@@ -304,7 +315,7 @@ Pose2 ScanMatcher::correlate(const LiveGrid& grid, const Pose2& prior, const Sym
         const double score = per_point * static_cast<double>(sum) - penalty;
         if (score > best) {
           best = score;
-          best_pose = {prior.x + dx * step_m, prior.y + dy * step_m, prior.theta + static_cast<double>(theta)};
+          best_pose = {centre.x + dx * step_m, centre.y + dy * step_m, centre.theta + static_cast<double>(theta)};
         }
       }
     }
@@ -314,12 +325,97 @@ Pose2 ScanMatcher::correlate(const LiveGrid& grid, const Pose2& prior, const Sym
 
 MatchResult ScanMatcher::search(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const {
   const MatchResult near = refine(grid, prior, prior, prior_information);
-  const MatchResult far = refine(grid, correlate(grid, prior, prior_information), prior, prior_information);
+  const SearchWindow window{static_cast<std::int32_t>(config_.search_distance_m / grid.cell_m()) / kSearchStep,
+                            kSearchStep,
+                            static_cast<std::int32_t>(config_.search_angle_rad / config_.search_angle_step_rad),
+                            config_.search_angle_step_rad};
+  const Pose2 start = correlate(grid, window, prior, prior, prior_information);
+  const MatchResult far = refine(grid, start, prior, prior_information);
   const auto value = [&](const MatchResult& m) {
     const Pose2 e = between(prior, m.pose);
     return static_cast<double>(config_.scan_weight * m.score) - 0.5 * quadratic_form(prior_information, e);
   };
   return value(far) > value(near) + (near.good ? static_cast<double>(config_.search_gain) : 0.0) ? far : near;
+}
+
+MatchResult ScanMatcher::recover(const LiveGrid& grid, const Pose2& prior, const MatchResult& ordinary) const {
+  MatchResult found;
+  found.pose = prior;
+  if (!(config_.recovery_distance_m > 0.0F) || 4 * count_ < config_.search_points) {
+    return found;
+  }
+  // Half the window counts as one deviation: at its edge the prior costs a sixtieth of what the scan can weigh.
+  const auto m = 0.5 * static_cast<double>(config_.recovery_distance_m);
+  const auto rad = 0.5 * static_cast<double>(config_.recovery_angle_rad) + 1e-3;
+  const Sym3 weak = diagonal(1.0 / (m * m), 1.0 / (m * m), 1.0 / (rad * rad));
+  const float turn = config_.recovery_angle_step_rad;
+  const SearchWindow wide{static_cast<std::int32_t>(config_.recovery_distance_m / grid.cell_m()) / kRecoveryStep,
+                          kRecoveryStep, static_cast<std::int32_t>(config_.recovery_angle_rad / turn), turn};
+  const SearchWindow close{kRecoveryStep - 1, 1, kRecoveryFiner, turn / static_cast<float>(kRecoveryFiner)};
+  const Pose2 place = correlate(grid, wide, prior, prior, weak);
+  found = refine(grid, correlate(grid, close, place, prior, weak), prior, weak);
+  found.recovered = true;
+  found.good = found.good && found.inlier_share >= config_.recovery_inlier_share &&
+               found.score >= ordinary.score + config_.recovery_gain;
+  return found;
+}
+
+bool ScanMatcher::ends_in_free(const LiveGrid& grid, const Ray& beam) const {
+  if (!grid.grid().window().contains(beam.column_to, beam.row_to)) {
+    return false;
+  }
+  const std::size_t end = grid.grid().index(beam.column_to, beam.row_to);
+  return grid.grid().cell(end).observations >= kFreeObservations && grid.field_data()[end] == 0;
+}
+
+/// The cells at the beam's end are left out: walls are rough there.
+bool ScanMatcher::goes_through(const LiveGrid& grid, const Ray& beam) const {
+  bool through = false;
+  visit_ray(beam, grid.grid().window(), [&](std::int32_t column, std::int32_t row, bool /*hit*/) {
+    const std::int32_t dc = column - beam.column_to;
+    const std::int32_t dr = row - beam.row_to;
+    const std::size_t at = grid.grid().index(column, row);
+    // The field first, which is 0 nearly everywhere.
+    through = through || (grid.field_data()[at] >= kSolidField && dc * dc + dr * dr > kBeamEnd * kBeamEnd &&
+                          solidity(grid.grid().cell(at)) >= kSolid);
+  });
+  return through;
+}
+
+MapAgreement ScanMatcher::compare(const LiveGrid& grid, const Pose2& pose) const {
+  MapAgreement out;
+  if (count_ == 0 || config_.search_points == 0) {
+    return out;
+  }
+  const GridPose at = grid_pose(pose, grid.cell_m());
+  const auto cell_column = [&](const Point2f& q) {
+    return at.column + floor_cell(at.x_cells + at.cos * q.x - at.sin * q.y);
+  };
+  const auto cell_row = [&](const Point2f& q) { return at.row + floor_cell(at.y_cells + at.sin * q.x + at.cos * q.y); };
+  const auto agrees = [&](const Point2f& q) {
+    return static_cast<float>(grid.field(cell_column(q), cell_row(q))) > kInlierField * 255.0F;
+  };
+  const std::size_t stride = search_stride();
+  for (std::size_t i = 0; i < count_; i += stride) {
+    ++out.beams;
+    out.agreeing = static_cast<std::uint16_t>(out.agreeing + (agrees(memory_.points[i]) ? 1 : 0));
+  }
+  if (kSomeBeams * (out.beams - out.agreeing) <= out.beams) {
+    return out;
+  }
+  for (std::size_t i = 0; i < count_; i += stride) {
+    const Point2f q = memory_.points[i];
+    const Ray beam{cell_column(origin_), cell_row(origin_), cell_column(q), cell_row(q), true};
+    if (agrees(q)) {
+      continue;
+    }
+    if (goes_through(grid, beam)) {
+      ++out.through;
+    } else if (ends_in_free(grid, beam)) {
+      ++out.short_of;
+    }
+  }
+  return out;
 }
 
 }  // namespace mellin

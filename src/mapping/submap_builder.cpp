@@ -4,12 +4,41 @@ namespace mellin {
 
 void SubmapBuilder::reset() {
   stage_ = Stage::idle;
+  ended_ = EndedStretch{};
+  count_from_here();
+}
+
+void SubmapBuilder::count_from_here() {
   any_frozen_ = false;
   taken_ = 0;
   new_scans_ = 0;
   path_m_ = 0.0;
   new_path_m_ = 0.0;
   new_drift_ = Sym3{};
+}
+
+bool SubmapBuilder::stretch_ended(const LocalMapper& mapper) {
+  const bool worth_it = any_frozen_ || taken_ >= config_.min_scans;
+  const bool kept = !ended_.waits && (worth_it || new_scans_ == 0);
+  const std::uint32_t end = mapper.stretch_begin();
+  const std::uint32_t first = end - (taken_ < end ? taken_ : end);
+  const auto stretch = static_cast<std::uint16_t>(mapper.stretch() - 1);
+  ended_ = {worth_it && new_scans_ > 0, {first, end, middle_, any_frozen_, stretch}};
+  count_from_here();
+  return kept;
+}
+
+SubmapBuilder::Range SubmapBuilder::open_range(const LocalMapper& mapper) const {
+  return {mapper.first_remembered(), mapper.scans().end(), middle_, any_frozen_, mapper.stretch()};
+}
+
+/// Its scans leave the memory one by one: only those count that stay as long as the live map's own.
+SubmapBuilder::Range SubmapBuilder::ended_range(const LocalMapper& mapper) const {
+  Range range = ended_.range;
+  const std::uint32_t end = mapper.scans().end();
+  const std::uint32_t staying = end > config_.max_scans ? end - config_.max_scans : 0;
+  range.first = range.first > staying ? range.first : staying;
+  return range;
 }
 
 bool SubmapBuilder::scan_taken(const LocalMapper& mapper) {
@@ -36,12 +65,12 @@ bool SubmapBuilder::too_uncertain(const Sym3& drift) const {
   return share * drift.xx > m * m || share * drift.yy > m * m || share * drift.tt > rad * rad;
 }
 
-std::uint32_t SubmapBuilder::scans_in_reach(const LocalMapper& mapper) const {
-  const std::uint32_t end = mapper.scans().end();
+std::uint32_t SubmapBuilder::scans_in_reach(const LocalMapper& mapper, const Range& range) const {
+  const std::uint32_t end = range.end;
   std::uint32_t count = 1;
   double path = 0.0;
   Sym3 drift;
-  while (count < config_.max_scans && end - count > mapper.first_remembered()) {
+  while (count < config_.max_scans && end - count > range.first) {
     const std::uint32_t next = end - count;
     path += translation(between(mapper.scan_pose(next - 1), mapper.scan_pose(next)));
     drift = drift + mapper.scan_drift(next);
@@ -58,14 +87,17 @@ Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells)
   if (active()) {
     return Status::busy;
   }
-  const std::uint32_t end = mapper.scans().end();
-  if (end == 0) {
-    return Status::degenerate;
+  const bool ended = ended_.waits;
+  ended_.waits = false;
+  const Range range = ended ? ended_range(mapper) : open_range(mapper);
+  const std::uint32_t end = range.end;
+  if (end <= range.first) {
+    return ended ? Status::not_found : Status::degenerate;
   }
   first_before_ = first_scan_;
-  count_before_ = any_frozen_ ? scan_count_ : 0;
+  count_before_ = range.any_frozen ? scan_count_ : 0;
   swap_poses();
-  scan_count_ = scans_in_reach(mapper);
+  scan_count_ = scans_in_reach(mapper, range);
   first_scan_ = end - scan_count_;
   Pose2 low = mapper.scan_pose(first_scan_);
   Pose2 high = low;
@@ -81,8 +113,10 @@ Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells)
   session_T_newest_ = mapper.scan_pose(end - 1);
   const std::uint32_t middle = first_scan_ + scan_count_ / 2;
   from_before_ = SubmapStep{};
-  from_before_.drift = any_frozen_ ? drift_since(mapper, centre, middle_, middle) : Sym3{};
-  middle_ = middle;
+  from_before_.drift = range.any_frozen
+                           ? drift_since(mapper, centre, range.middle < range.first ? range.first : range.middle, middle)
+                           : Sym3{};
+  rendered_stretch_ = range.stretch;
   header_ = SubmapHeader{};
   header_.stamp_us = mapper.scans().stamp_us(end - 1);
   header_.first_scan = first_scan_;
@@ -91,6 +125,10 @@ Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells)
   next_row_ = 0;
   smoother_.begin(first_scan_, memory_.poses.first(scan_count_));
   stage_ = Stage::smooth;
+  if (ended) {
+    return Status::ok;
+  }
+  middle_ = middle;
   any_frozen_ = true;
   new_scans_ = 0;
   new_path_m_ = 0.0;
@@ -141,10 +179,9 @@ Pose2 SubmapBuilder::measured_step(std::uint32_t shared) const {
 
 Sym3 SubmapBuilder::drift_since(const LocalMapper& mapper, const Pose2& session_T_submap, std::uint32_t from,
                                 std::uint32_t to) const {
-  const std::uint32_t oldest = mapper.first_remembered();
   Sym3 sum;
   std::uint32_t count = 0;
-  for (std::uint32_t number = (from < oldest ? oldest : from) + 1; number <= to; ++number) {
+  for (std::uint32_t number = from + 1; number <= to; ++number) {
     const Pose2 submap_T_robot = between(session_T_submap, mapper.scan_pose(number));
     sum = sum + carried(mapper.scan_drift(number), submap_T_robot);
     ++count;

@@ -26,7 +26,8 @@ static_assert(same(MELLIN_PART_GRID, Part::grid) && same(MELLIN_PART_SCANS, Part
 
 constexpr bool same(mellin_scan_use c, ScanUse cpp) { return c == static_cast<int>(cpp); }
 static_assert(same(MELLIN_SCAN_TAKEN, ScanUse::taken) && same(MELLIN_SCAN_MATCHED, ScanUse::matched) &&
-              same(MELLIN_SCAN_ODOMETRY, ScanUse::odometry));
+              same(MELLIN_SCAN_ODOMETRY, ScanUse::odometry) && same(MELLIN_SCAN_DOUBTED, ScanUse::doubted) &&
+              same(MELLIN_SCAN_LOST, ScanUse::lost));
 
 constexpr bool same(mellin_edge_kind c, EdgeKind cpp) { return c == static_cast<int>(cpp); }
 static_assert(same(MELLIN_EDGE_ODOMETRY, EdgeKind::odometry) && same(MELLIN_EDGE_LOOP, EdgeKind::loop) &&
@@ -71,7 +72,7 @@ mellin_memory_use c_memory_use(const ArenaUse& use) {
 }
 
 mellin_mapper_statistics c_statistics(const MapperStatistics& s) {
-  return {s.scans, s.taken, s.unmatched, s.refused, s.resampled};
+  return {s.scans, s.taken, s.unmatched, s.refused, s.resampled, s.recovered, s.doubted, s.lost};
 }
 
 mellin_slam_statistics c_statistics(const SlamStatistics& s) {

@@ -103,6 +103,11 @@ void Slam::count_since(std::uint64_t before_us, std::uint64_t& spent_us) {
 Result<ScanOutcome> Slam::add(const Scan& scan) {
   const std::uint64_t before = now_us();
   const Result<ScanOutcome> outcome = mapper_.add(scan);
+  if (outcome.ok() && outcome.value().use == ScanUse::lost) {
+    log_.write(MELLIN_LOG_WARNING, LogLine() << "lost at scan " << outcome.value().anchor_scan
+                                             << ": the live map begins afresh, in a component of its own");
+    statistics_.submaps_lost += builder_.stretch_ended(mapper_) ? 0U : 1U;
+  }
   if (outcome.ok() && outcome.value().taken) {
     freeze_if_due(builder_.scan_taken(mapper_));
   }
@@ -111,7 +116,7 @@ Result<ScanOutcome> Slam::add(const Scan& scan) {
 }
 
 void Slam::freeze_if_due(bool due) {
-  if (!due) {
+  if (!due && !builder_.has_ended_stretch()) {
     return;
   }
   if (builder_.active() || rendered_) {
@@ -124,11 +129,21 @@ void Slam::freeze_if_due(bool due) {
     return;
   }
   slot_ = static_cast<SlotHandle&&>(slot.value());
-  if (builder_.begin(mapper_, store_.slots().cells(slot_)) != Status::ok) {
+  const Status status = builder_.begin(mapper_, store_.slots().cells(slot_));
+  if (status != Status::ok) {
+    statistics_.submaps_lost += status == Status::not_found ? 1U : 0U;
     (void)store_.slots().release(slot_);
     return;
   }
   ++statistics_.submaps_due;
+}
+
+/// All slots are taken by who reads grids: waiting for one could last for ever.
+void Slam::forget_what_cannot_be_frozen() {
+  if (builder_.has_ended_stretch()) {
+    builder_.forget_ended_stretch();
+    ++statistics_.submaps_lost;
+  }
 }
 
 void Slam::render_slice() {
@@ -144,7 +159,8 @@ void Slam::render_slice() {
 }
 
 void Slam::hand_over() {
-  const Result<SubmapId> id = collection_.insert(builder_.header(), slot_, builder_.from_before());
+  const Result<SubmapId> id =
+      collection_.insert(builder_.header(), slot_, builder_.from_before(), builder_.stretch());
   rendered_ = false;
   if (!id.ok()) {
     ++statistics_.submaps_lost;
@@ -157,7 +173,9 @@ void Slam::hand_over() {
   }
 }
 
-bool Slam::pending() const { return builder_.active() || rendered_ || !collection_.idle() || flush_ != Flush::none; }
+bool Slam::pending() const {
+  return builder_.active() || rendered_ || builder_.has_ended_stretch() || !collection_.idle() || flush_ != Flush::none;
+}
 
 bool Slam::work(std::uint32_t budget) {
   for (std::uint32_t i = 0; i < (budget == 0 ? 1 : budget) && pending(); ++i) {
@@ -167,6 +185,9 @@ bool Slam::work(std::uint32_t budget) {
       collection_.step();
     } else if (rendered_) {
       hand_over();
+    } else if (builder_.has_ended_stretch()) {
+      freeze_if_due(true);
+      forget_what_cannot_be_frozen();
     } else if (flush_ == Flush::submap) {
       flush_ = Flush::records;
       freeze_if_due(builder_.has_unfrozen());
@@ -201,7 +222,7 @@ Status Slam::new_session(const Pose2& session_T_base) {
 MapPose Slam::map_pose() const {
   MapPose out;
   const SubmapId newest = collection_.newest_of_session();
-  if (newest == kNoSubmap) {
+  if (newest == kNoSubmap || collection_.stretch_of(newest) != mapper_.stretch()) {
     out.map_T_base = mapper_.pose();
     return out;
   }

@@ -72,6 +72,7 @@ Summary summarise(const MappingRun& run, const std::vector<std::vector<SubmapId>
     out.scans = session.scans.size();
     out.submaps = session.submaps.size();
     out.component = session.submaps.empty() ? 0 : component_number[map.component(session.submaps.front())];
+    out.lost = session.lost;
     s.sessions.push_back(out);
   }
   for (EdgeId id = 0; id < map.graph().edge_count(); ++id) {

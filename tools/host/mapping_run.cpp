@@ -142,6 +142,25 @@ void MappingRun::drain() {
   }
 }
 
+/// The last scan begins a new stretch. Those since the first one that was in doubt belong to it, and not to the last
+/// scan that was not; so do those right before that rode on odometry.
+void MappingRun::rehang_doubted(MappedSession& session) {
+  const MappedSession::MappedScan first = session.scans.back();
+  const auto of_old_anchor = [&](const MappedSession::MappedScan& scan) {
+    return scan.anchor_scan + 1 == first.anchor_scan;
+  };
+  auto from = std::find_if(session.scans.begin(), session.scans.end(), [&](const MappedSession::MappedScan& scan) {
+    return of_old_anchor(scan) && scan.use == ScanUse::doubted;
+  });
+  while (from != session.scans.begin() && of_old_anchor(*(from - 1)) && (from - 1)->use == ScanUse::odometry) {
+    --from;
+  }
+  for (; from != session.scans.end(); ++from) {
+    from->anchor_scan = first.anchor_scan;
+    from->anchor_T_base = between(first.session_T_base, from->session_T_base);
+  }
+}
+
 void MappingRun::map(const Log& log, const std::vector<std::uint8_t>& lasers,
                      const std::function<void(std::size_t)>& progress) {
   if (!sessions_.empty()) {
@@ -172,12 +191,17 @@ void MappingRun::map(const Log& log, const std::vector<std::uint8_t>& lasers,
       mapped.session_T_base = outcome.value().session_T_base;
       mapped.anchor_scan = outcome.value().anchor_scan;
       mapped.anchor_T_base = outcome.value().anchor_T_base;
+      mapped.use = outcome.value().use;
     } else if (!session.scans.empty()) {
       mapped = session.scans.back();
       mapped.stamp = in.stamp;
       mapped.seconds = in.seconds;
     }
     session.scans.push_back(mapped);
+    if (outcome.ok() && mapped.use == ScanUse::lost) {
+      ++session.lost;
+      rehang_doubted(session);
+    }
     drain();
     if (progress && i % 64 == 0) {
       progress(i);

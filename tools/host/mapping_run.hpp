@@ -26,8 +26,10 @@ struct MappedSession {
     Pose2 session_T_base;  ///< live
     std::uint32_t anchor_scan = 0;
     Pose2 anchor_T_base;
+    ScanUse use = ScanUse::odometry;
   };
   std::vector<MappedScan> scans;
+  std::uint32_t lost = 0;  ///< times that the robot did not know where it was
   /// For each taken scan, the submaps that hold it and how central it is in each.
   struct Placement {
     SubmapId submap = kNoSubmap;
@@ -79,6 +81,7 @@ class MappingRun {
   void reserve_room();
   void take_events();
   void drain();
+  static void rehang_doubted(MappedSession& session);
   Pose2 scan_pose(const MappedSession& session, std::uint32_t scan) const;
 
   struct FrozenSubmap {

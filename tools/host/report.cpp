@@ -119,11 +119,12 @@ Html tiles(const Summary& s) {
 Html sessions(const Summary& s) {
   Html html =
       "<table><tr><th>log</th><th>session</th><th class=\"n\">scans</th><th class=\"n\">submaps</th>"
-      "<th class=\"n\">component</th></tr>\n";
+      "<th class=\"n\">component</th><th class=\"n\">lost</th></tr>\n";
   for (const SessionSummary& session : s.sessions) {
     html += "<tr><td>" + escape_html(session.log) + "</td><td><code>" + escape_html(session.id) +
             "</code></td><td class=\"n\">" + count(session.scans) + "</td><td class=\"n\">" + count(session.submaps) +
-            "</td><td class=\"n\">" + count(session.component) + "</td></tr>\n";
+            "</td><td class=\"n\">" + count(session.component) + "</td><td class=\"n\">" + count(session.lost) +
+            "</td></tr>\n";
   }
   return html + "</table>\n";
 }

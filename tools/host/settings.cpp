@@ -54,6 +54,16 @@ void visit_settings(C& c, Visit&& visit) {
   visit("matcher.point_sigma_m", c.mapper.matcher.point_sigma_m);
   visit("matcher.independent_share", c.mapper.matcher.independent_share);
   visit("matcher.min_inlier_share", c.mapper.matcher.min_inlier_share);
+  visit("matcher.recovery_distance_m", c.mapper.matcher.recovery_distance_m);
+  visit("matcher.recovery_angle_rad", c.mapper.matcher.recovery_angle_rad);
+  visit("matcher.recovery_angle_step_rad", c.mapper.matcher.recovery_angle_step_rad);
+  visit("matcher.recovery_inlier_share", c.mapper.matcher.recovery_inlier_share);
+  visit("matcher.recovery_gain", c.mapper.matcher.recovery_gain);
+  visit("monitor.lost_scans", c.mapper.monitor.lost_scans);
+  visit("monitor.conflict_share", c.mapper.monitor.conflict_share);
+  visit("monitor.sure_share", c.mapper.monitor.sure_share);
+  visit("monitor.suspect_share", c.mapper.monitor.suspect_share);
+  visit("monitor.least_share", c.mapper.monitor.least_share);
   visit("submaps.max_path_m", c.submaps.max_path_m);
   visit("submaps.every_scans", c.submaps.every_scans);
   visit("submaps.every_path_m", c.submaps.every_path_m);

@@ -34,8 +34,12 @@ Json config_json(const Summary& summary) {
 Json sessions_json(const Summary& summary) {
   Json json = Json::array();
   for (const SessionSummary& s : summary.sessions) {
-    json.push_back(
-        {{"log", s.log}, {"id", s.id}, {"scans", s.scans}, {"submaps", s.submaps}, {"component", s.component}});
+    json.push_back({{"log", s.log},
+                    {"id", s.id},
+                    {"scans", s.scans},
+                    {"submaps", s.submaps},
+                    {"component", s.component},
+                    {"lost", s.lost}});
   }
   return json;
 }

@@ -19,7 +19,8 @@ struct SessionSummary {
   std::string id;  ///< UUID
   std::uint64_t scans = 0;
   std::uint64_t submaps = 0;
-  std::uint64_t component = 0;
+  std::uint64_t component = 0;  ///< of its first submap
+  std::uint64_t lost = 0;       ///< times that a new component was begun, since the robot did not know where it was
 };
 
 struct EdgeCounts {

@@ -65,6 +65,7 @@ const char* to_string(LinkReason reason);
 /// Which scans a node rests on, so that shared ones are counted once.
 struct NodeScans {
   std::uint16_t session = 0;
+  std::uint16_t stretch = 0;  ///< of the session: only within one are poses held together by odometry
   std::uint32_t first = 0;
   std::uint32_t count = 0;
 };

@@ -138,9 +138,11 @@ class MapCollection {
 
   /// Takes a submap that was rendered into the slot (header without id and session) and starts to work on it; the
   /// handle is taken over. An odometry edge joins it to the session's submap before: as `from_before` measured it, or,
-  /// where that is about another submap or no measurement, as their poses in the session have it. Returns its id. busy:
-  /// step() has not finished with the one before. full: max_submaps.
-  Result<SubmapId> insert(SubmapHeader header, SlotHandle& slot, const SubmapStep& from_before);
+  /// where that is about another submap or no measurement, as their poses in the session have it. Submaps of different
+  /// stretches of a session get none: the robot was lost meanwhile. Returns its id. busy: step() has not finished with
+  /// the one before. full: max_submaps.
+  Result<SubmapId> insert(SubmapHeader header, SlotHandle& slot, const SubmapStep& from_before,
+                          std::uint16_t stretch = 0);
 
   /// Whether step() has nothing to do.
   bool idle() const { return stage_ == Stage::idle; }
@@ -159,6 +161,8 @@ class MapCollection {
   /// The following require id < size().
   const SubmapHeader& header(SubmapId id) const { return memory_.headers[id]; }
   std::uint16_t session_of(SubmapId id) const { return memory_.scans[id].session; }
+  /// Which of the session's stretches it is of.
+  std::uint16_t stretch_of(SubmapId id) const { return memory_.scans[id].stretch; }
   /// Pose in the frame of its component.
   const Pose2& map_T_submap(SubmapId id) const { return graph_.pose(id); }
   /// Components are named by their smallest submap.
@@ -198,6 +202,7 @@ class MapCollection {
   };
 
   void run_slice();
+  bool same_stretch(SubmapId a, SubmapId b) const;
   void link_odometry(SubmapId id, const SubmapStep& from_before);
   /// How b lies to a by their poses in their session.
   Pose2 session_step(SubmapId a, SubmapId b) const {

@@ -19,11 +19,15 @@ inline constexpr std::uint8_t kNodeRecord = 2;    ///< id: submap
 inline constexpr std::uint8_t kEdgeRecord = 3;
 inline constexpr std::uint32_t kFirstLoopRecord = 0x80000000U;
 
-/// 24 bytes: x, y, theta as IEEE 754 doubles.
-inline constexpr std::size_t kNodeRecordBytes = 24;
-std::size_t write_node_record(const Pose2& map_T_submap, Span<std::uint8_t> out);
-/// False where the record is not a finite pose.
-bool read_node_record(Span<const std::uint8_t> bytes, Pose2& map_T_submap);
+struct NodeRecord {
+  Pose2 map_T_submap;
+  std::uint16_t stretch = 0;  ///< of its session
+};
+/// 26 bytes: x, y, theta as IEEE 754 doubles, then the stretch. Records without it, of 24 bytes, are of stretch 0.
+inline constexpr std::size_t kNodeRecordBytes = 26;
+std::size_t write_node_record(const NodeRecord& node, Span<std::uint8_t> out);
+/// False where the record has no finite pose.
+bool read_node_record(Span<const std::uint8_t> bytes, NodeRecord& node);
 
 /// 84 bytes: a, b (32 bits each), kind, enabled (8 bits each), two zero bytes, x, y, theta, then the information
 /// xx, xy, xt, yy, yt, tt as doubles.

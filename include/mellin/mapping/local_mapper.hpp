@@ -17,6 +17,8 @@ enum class ScanUse : std::uint8_t {
   taken,     ///< matched and added to the live map
   matched,   ///< matched to the live map only
   odometry,  ///< matching failed: the pose rides on odometry from the last one
+  doubted,   ///< due to be taken, but it contradicts the live map: not added, since the robot may not be where it seems
+  lost,      ///< too many in a row did: the live map begins afresh with this scan, where odometry has the robot
 };
 
 struct ScanOutcome {
@@ -43,6 +45,9 @@ struct MapperStatistics {
   std::uint32_t stamps_back = 0;  ///< accepted scans stamped earlier than the one accepted before
   std::uint32_t stamps_repeated = 0;  ///< accepted scans stamped as the one accepted before
   std::uint32_t resampled = 0;
+  std::uint32_t recovered = 0;  ///< matched by the wider search only
+  std::uint32_t doubted = 0;    ///< due to be taken, and not added
+  std::uint32_t lost = 0;       ///< times that the live map began afresh
 };
 
 class LocalMapper {
@@ -67,6 +72,11 @@ class LocalMapper {
   /// wait to be rendered.
   virtual const ScanMemory& scans() const = 0;
   virtual std::uint32_t first_remembered() const = 0;
+  /// A stretch is the way from one loss of the robot's place to the next; within a session they count from 0. Poses
+  /// are continuous by odometry from one to the next, but nothing else holds them together.
+  virtual std::uint16_t stretch() const = 0;
+  /// Number of the present stretch's first scan: the live map holds none from before.
+  virtual std::uint32_t stretch_begin() const = 0;
   /// Where the robot was at a scan that scans() holds, as the best hypothesis has it now.
   virtual Pose2 scan_pose(std::uint32_t number) const = 0;
   /// Covariance, in the robot's own frame, of what the error of the odometry since the scan before leaves in that

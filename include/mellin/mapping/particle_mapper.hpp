@@ -11,6 +11,7 @@
 #include "mellin/mapping/local_mapper.hpp"
 #include "mellin/mapping/odometry_model.hpp"
 #include "mellin/mapping/scan_matcher.hpp"
+#include "mellin/mapping/track_monitor.hpp"
 
 namespace mellin {
 
@@ -32,6 +33,7 @@ struct ParticleMapperConfig {
   ScanMatcherConfig matcher;
   MotionNoise noise;
   OdometryModelConfig odometry;
+  TrackMonitorConfig monitor;
 };
 
 class ParticleMapper final : public LocalMapper {
@@ -78,8 +80,11 @@ class ParticleMapper final : public LocalMapper {
   float cell_m() const override { return config_.cell_m; }
   const ScanMemory& scans() const override { return scans_; }
   std::uint32_t first_remembered() const override {
-    return scans_.end() > config_.remembered_scans ? scans_.end() - config_.remembered_scans : 0;
+    return scans_.end() > stretch_begin_ + config_.remembered_scans ? scans_.end() - config_.remembered_scans
+                                                                    : stretch_begin_;
   }
+  std::uint16_t stretch() const override { return stretch_; }
+  std::uint32_t stretch_begin() const override { return stretch_begin_; }
   Pose2 scan_pose(std::uint32_t number) const override { return poses(best_)[number % pose_capacity()]; }
   Sym3 scan_drift(std::uint32_t number) const override { return memory_.drifts[number % pose_capacity()]; }
   const MapperStatistics& statistics() const override { return statistics_; }
@@ -114,8 +119,12 @@ class ParticleMapper final : public LocalMapper {
   Sym3 prior_information(const Pose2& motion) const;
   void learn_odometry(std::uint32_t number, const Sym3& scan_information);
   ScanUse track(const Pose2& predicted, const Sym3& prior);
-  bool take(const Pose2& predicted, const Sym3& prior);
-  bool propose(std::size_t index, const Pose2& predicted, const Sym3& prior);
+  ScanUse take(const Pose2& predicted, const Sym3& prior);
+  bool due(const Pose2& odometry) const;
+  MatchResult reconsidered(const LiveGrid& grid, const Pose2& predicted, const MatchResult& match);
+  void begin_stretch(const Pose2& session_T_base);
+  void copy_poses(std::size_t from, std::size_t to);
+  void propose(std::size_t index, const Pose2& predicted, const Sym3& prior);
   void remember(std::size_t index, std::uint32_t number);
   void resample_if_poor();
 
@@ -125,6 +134,7 @@ class ParticleMapper final : public LocalMapper {
   ScanMemory scans_;
   ScanMatcher matcher_;
   OdometryModel odometry_;
+  TrackMonitor monitor_;
   std::uint64_t seed_ = 0;
   MapperStatistics statistics_;
   std::size_t best_ = 0;
@@ -134,6 +144,9 @@ class ParticleMapper final : public LocalMapper {
   std::int64_t last_stamp_us_ = 0;  ///< of the newest scan
   Pose2 last_odometry_;             ///< at the newest scan
   Pose2 taken_odometry_;            ///< at the newest taken scan
+  Pose2 due_odometry_;              ///< at the newest scan that was due to be taken
+  std::uint32_t stretch_begin_ = 0;
+  std::uint16_t stretch_ = 0;
 };
 
 }  // namespace mellin

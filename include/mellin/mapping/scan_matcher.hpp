@@ -31,6 +31,15 @@ struct ScanMatcherConfig {
   float point_sigma_m = 0.03F;
   float independent_share = 0.2F;
   float min_inlier_share = 0.35F;  ///< of the beams must end near something solid for a match to count
+  /// Where the ordinary search fails (a wheel slipped, a hand pushed the robot): half-widths and step of the wider and
+  /// coarser one that follows; a distance of 0: none does.
+  float recovery_distance_m = 1.2F;
+  float recovery_angle_rad = 0.7F;
+  float recovery_angle_step_rad = 0.0349065850F;
+  /// What it finds must be clearer than an ordinary match, since chance has more poses to choose from: so many of the
+  /// beams end near something solid, and the score is better by so much.
+  float recovery_inlier_share = 0.8F;
+  float recovery_gain = 0.1F;
 };
 
 struct MatchResult {
@@ -40,6 +49,16 @@ struct MatchResult {
   float inlier_share = 0.0F;
   bool converged = false;  ///< whether the last step was below a tenth of a millimetre and of a milliradian
   bool good = false;       ///< inlier_share suffices
+  bool recovered = false;  ///< by recover(): the odometry says little about it
+};
+
+/// How a scan at a pose goes with what the live map has observed, over a sample of its beams.
+struct MapAgreement {
+  std::uint16_t beams = 0;     ///< looked at
+  std::uint16_t agreeing = 0;  ///< end near something solid
+  std::uint16_t short_of = 0;  ///< end where the map has observed free space only: something new, or somebody, is there
+  std::uint16_t through = 0;   ///< went through something solid
+  std::uint16_t conflicts() const { return static_cast<std::uint16_t>(short_of + through); }
 };
 
 class ScanMatcher {
@@ -70,6 +89,8 @@ class ScanMatcher {
   /// vectors in the base frame); `base_T_laser` is where the beams start. Returns how many beams measured something.
   std::size_t set_scan(Span<const StoredRange> ranges, Span<const Point2f> directions, const Pose2& base_T_laser,
                        float cell_m);
+  /// How many.
+  std::size_t points() const { return count_; }
 
   /// Gauss-Newton from `start`. A point pulls along the normal of its surface only: where a surface comes into view
   /// from behind another, its new points would else be drawn along it to what of it is in the map, and every scan
@@ -87,17 +108,40 @@ class ScanMatcher {
   /// one counts. Cost: (2 search_distance / (2 cells))^2 x angles x search_points cells.
   MatchResult search(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const;
 
+  /// search() over recovery_distance_m and recovery_angle_rad, by steps of three cells and then of one: for an odometry
+  /// that has erred beyond what its noise says, which only keeps a weak say between poses that the scan fits equally.
+  /// Good where it is clearer than `ordinary`, as the configuration says, and not where few beams measured anything.
+  /// Cost: (2 recovery_distance / (3 cells))^2 x angles x search_points cells.
+  MatchResult recover(const LiveGrid& grid, const Pose2& prior, const MatchResult& ordinary) const;
+
+  /// What the map says against the scan at a pose, and what for it. A beam that ends in a cell that was never observed,
+  /// on a way on which nothing solid is known, says nothing: that is new space. Where nearly all beams agree, conflicts
+  /// are not looked for. Cost: search_points beams, walked cell by cell within the window.
+  MapAgreement compare(const LiveGrid& grid, const Pose2& pose) const;
+
  private:
   struct Linearised;
   Linearised linearise(const LiveGrid& grid, const GridPose& at, float x, float y, float theta) const;
   struct SearchPoints;
   SearchPoints place_points(const LiveGrid& grid, const GridPose& at, float theta, std::size_t stride,
                             std::int32_t reach_cells) const;
-  Pose2 correlate(const LiveGrid& grid, const Pose2& prior, const Sym3& prior_information) const;
+  /// The poses of a correlative search: half-widths and steps.
+  struct SearchWindow {
+    std::int32_t reach = 0;  ///< steps along x and y
+    std::int32_t step = 1;   ///< cells
+    std::int32_t turns = 0;  ///< steps in heading
+    float turn_rad = 0.0F;
+  };
+  std::size_t search_stride() const { return (count_ + config_.search_points - 1) / config_.search_points; }
+  Pose2 correlate(const LiveGrid& grid, const SearchWindow& window, const Pose2& centre, const Pose2& prior,
+                  const Sym3& prior_information) const;
+  bool goes_through(const LiveGrid& grid, const Ray& beam) const;
+  bool ends_in_free(const LiveGrid& grid, const Ray& beam) const;
 
   ScanMatcherConfig config_;
   Memory memory_;
   std::size_t count_ = 0;  ///< points of the scan, in cells
+  Point2f origin_;         ///< of its beams, in cells
 };
 
 }  // namespace mellin

@@ -60,8 +60,20 @@ class SubmapBuilder {
   /// Whether scans were taken that no submap holds yet.
   bool has_unfrozen() const { return new_scans_ > 0; }
 
-  /// Freezes the newest scans: takes over their poses. Smoothing them and rendering into `cells` (side * side) follow
-  /// in steps. busy: a submap is being made. degenerate: no scan was taken.
+  /// To be told when the mapper has begun another stretch, before its first scan: path and scans count from here. What
+  /// the old one has not frozen becomes its last submap by the next begin(). Returns whether nothing is lost by it:
+  /// false where the last submap of the stretch before was still waiting, and where a stretch without any submap has
+  /// fewer than min_scans scans, which would be found again nowhere.
+  bool stretch_ended(const LocalMapper& mapper);
+  /// Whether the last submap of an ended stretch waits for begin().
+  bool has_ended_stretch() const { return ended_.waits; }
+  void forget_ended_stretch() { ended_.waits = false; }
+  /// The stretch of the scans that are rendered.
+  std::uint16_t stretch() const { return rendered_stretch_; }
+
+  /// Freezes the newest scans, or the last ones of an ended stretch: takes over their poses. Smoothing them and
+  /// rendering into `cells` (side * side) follow in steps. busy: a submap is being made. degenerate: no scan was taken.
+  /// not_found: those of the ended stretch have left the memory; it waits no longer.
   Status begin(const LocalMapper& mapper, Span<std::uint8_t> cells);
   /// The next slice of smoothing, or the next band. Returns true when the grid is complete. not_found: a scan has left
   /// the memory meanwhile; the submap is lost. Cost: that of ScanSmoother::step(), or band_rows x side cells and the
@@ -83,12 +95,27 @@ class SubmapBuilder {
 
  private:
   enum class Stage : std::uint8_t { idle, smooth, render };
+  /// Scans that one submap may hold, [first, end), and what goes before them.
+  struct Range {
+    std::uint32_t first = 0;
+    std::uint32_t end = 0;
+    std::uint32_t middle = 0;  ///< number of the scan in the middle of the stretch's last submap …
+    bool any_frozen = false;   ///< … if there is one
+    std::uint16_t stretch = 0;
+  };
+  struct EndedStretch {
+    bool waits = false;
+    Range range;
+  };
 
   void swap_poses();
   void place();
   Pose2 measured_step(std::uint32_t shared) const;
   void render_band(const ScanMemory& scans);
-  std::uint32_t scans_in_reach(const LocalMapper& mapper) const;
+  Range open_range(const LocalMapper& mapper) const;
+  Range ended_range(const LocalMapper& mapper) const;
+  void count_from_here();
+  std::uint32_t scans_in_reach(const LocalMapper& mapper, const Range& range) const;
   bool too_uncertain(const Sym3& drift) const;
   Sym3 drift_since(const LocalMapper& mapper, const Pose2& session_T_submap, std::uint32_t from,
                    std::uint32_t to) const;
@@ -106,14 +133,16 @@ class SubmapBuilder {
   Pose2 session_T_newest_;  ///< the newest frozen scan, as the local mapper has it
   SubmapHeader header_;
   SubmapStep from_before_;
-  std::uint32_t taken_ = 0;      ///< scans of the session
+  std::uint32_t taken_ = 0;      ///< scans of the stretch
   std::uint32_t new_scans_ = 0;  ///< since the last submap
-  double path_m_ = 0.0;          ///< of the session
+  double path_m_ = 0.0;          ///< of the stretch
   Sym3 new_drift_;               ///< since the last submap
   double new_path_m_ = 0.0;      ///< since the last submap
   Pose2 last_pose_;
   bool any_frozen_ = false;
   std::uint32_t middle_ = 0;  ///< number of the scan in the middle of the last submap
+  EndedStretch ended_;
+  std::uint16_t rendered_stretch_ = 0;
 };
 
 }  // namespace mellin
