@@ -125,7 +125,7 @@ void OdometryModel::learn(const Pose2& matched, const Sym3& scan_information) {
   const double along = weights.xx * distance_variance;
   const double across = weights.yy * distance_variance;
   const double heading = weights.tt * angle_variance;
-  const auto learn_direction = [this](NoiseMean& mean, double error, double share, double learnt, double expected) {
+  const auto learn_direction = [](NoiseMean& mean, double error, double share, double learnt, double expected) {
     if (share > 0.5) {  // below, most of the error was pulled back to the odometry by the match itself
       const double scan_variance = learnt / share - learnt;
       const double squared = clamped(error * error, 0.0, kOutlier * (learnt + scan_variance));
