@@ -448,6 +448,43 @@ TEST_CASE("a submap is the frozen scans rendered in one piece, whatever the band
   }
 }
 
+TEST_CASE("the step from the submap before is that of the scans that both hold, and of none after a reset") {
+  FakeMapper mapper(40, 24);
+  Builder b(builder_config());
+  std::vector<std::uint8_t> cells(256 * 256);
+  const auto freeze = [&] {
+    REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}) == Status::ok);
+    for (bool done = false; !done;) {
+      const Result<bool> step = b.builder.step(mapper.scans());
+      REQUIRE(step.ok());
+      done = step.value();
+    }
+    return b.builder.header();
+  };
+  const auto take = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      const auto n = static_cast<double>(mapper.scans().end());
+      mapper.take({-3.0 + 0.2 * n, 0.3 * std::sin(n), 0.1 * n});
+      (void)b.builder.scan_taken(mapper);
+    }
+  };
+  take(12);
+  const SubmapHeader first = freeze();  // scans 2 to 11
+  CHECK(b.builder.from_before().shared_scans == 0);
+  take(4);
+  const SubmapHeader second = freeze();  // scans 6 to 15
+  const SubmapStep step = b.builder.from_before();
+  CHECK(step.before_first_scan == 2);
+  CHECK(step.shared_scans == 6);
+  const Pose2 off = between(between(first.session_T_submap, second.session_T_submap), step.before_T_submap);
+  CHECK(translation(off) < 1e-9);
+  CHECK(std::fabs(off.theta) < 1e-9);
+  b.builder.reset();
+  take(1);
+  (void)freeze();  // scans 7 to 16, of which the one before held nine; but that was another session
+  CHECK(b.builder.from_before().shared_scans == 0);
+}
+
 TEST_CASE("submaps are due after K scans and then each N, or after so much path, or when drift has added up") {
   CHECK(due_at(builder_config(), 30, 0.1).after == std::vector<int>{10, 14, 18, 22, 26, 30});
   CHECK(due_at(builder_config(), 30, 0.1).counts == std::vector<std::uint32_t>(6, 10));

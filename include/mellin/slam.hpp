@@ -133,7 +133,7 @@ class Slam {
   MapCollection collection_;
   SubmapObserver observer_;
   SlamStatistics statistics_;
-  SlotHandle slot_;  ///< of the submap being rendered or waiting for the collection
+  SlotHandle slot_;        ///< of the submap being rendered or waiting for the collection
   bool rendered_ = false;  ///< slot_ is complete
   Flush flush_ = Flush::none;
 };

@@ -113,9 +113,9 @@ Status SubmapBuilder::begin(const LocalMapper& mapper, Span<std::uint8_t> cells)
   session_T_newest_ = mapper.scan_pose(end - 1);
   const std::uint32_t middle = first_scan_ + scan_count_ / 2;
   from_before_ = SubmapStep{};
-  from_before_.drift = range.any_frozen
-                           ? drift_since(mapper, centre, range.middle < range.first ? range.first : range.middle, middle)
-                           : Sym3{};
+  from_before_.drift =
+      range.any_frozen ? drift_since(mapper, centre, range.middle < range.first ? range.first : range.middle, middle)
+                       : Sym3{};
   rendered_stretch_ = range.stretch;
   header_ = SubmapHeader{};
   header_.stamp_us = mapper.scans().stamp_us(end - 1);
@@ -147,33 +147,36 @@ void SubmapBuilder::place() {
   header_.submap_T_robot = memory_.poses[scan_count_ - 1];
   header_.session_T_submap = compose(session_T_newest_, inverse(header_.submap_T_robot));
   from_before_.before_first_scan = first_before_;
+  const std::uint32_t from = first_before_ > first_scan_ ? first_before_ : first_scan_;
   const std::uint32_t end_before = first_before_ + count_before_;
-  from_before_.shared_scans = end_before > first_scan_ ? end_before - first_scan_ : 0;
-  if (from_before_.shared_scans > 0) {
-    from_before_.before_T_submap = measured_step(from_before_.shared_scans);
+  const std::uint32_t end_here = first_scan_ + scan_count_;
+  const std::uint32_t end = end_before < end_here ? end_before : end_here;
+  if (count_before_ > 0 && end > from) {
+    from_before_.shared_scans = end - from;
+    from_before_.before_T_submap = measured_step(memory_.poses_before.subspan(from - first_before_, end - from),
+                                                 memory_.poses.subspan(from - first_scan_, end - from));
   }
 }
 
-/// The motion that lays the shared scans, as this submap has them, on where the one before has them: the mean of the
-/// turns, and of the shifts that are left.
-Pose2 SubmapBuilder::measured_step(std::uint32_t shared) const {
-  const Span<const Pose2> here = memory_.poses.first(shared);
-  const Span<const Pose2> before = memory_.poses_before.subspan(first_scan_ - first_before_, shared);
+/// The motion that lays scans, as this submap has them, on where the one before has them: the mean of the turns, and of
+/// the shifts that are left.
+Pose2 SubmapBuilder::measured_step(Span<const Pose2> before, Span<const Pose2> here) {
+  const auto count = static_cast<double>(here.size());
   const double first_turn = before[0].theta - here[0].theta;
   double turn = 0.0;
-  for (std::uint32_t i = 0; i < shared; ++i) {
+  for (std::size_t i = 0; i < here.size(); ++i) {
     turn += wrap_angle(before[i].theta - here[i].theta - first_turn);
   }
-  Pose2 step{0.0, 0.0, wrap_angle(first_turn + turn / shared)};
+  Pose2 step{0.0, 0.0, wrap_angle(first_turn + turn / count)};
   double x = 0.0;
   double y = 0.0;
-  for (std::uint32_t i = 0; i < shared; ++i) {
+  for (std::size_t i = 0; i < here.size(); ++i) {
     const Pose2 turned = compose(step, here[i]);
     x += before[i].x - turned.x;
     y += before[i].y - turned.y;
   }
-  step.x = x / shared;
-  step.y = y / shared;
+  step.x = x / count;
+  step.y = y / count;
   return step;
 }
 

@@ -159,8 +159,7 @@ void Slam::render_slice() {
 }
 
 void Slam::hand_over() {
-  const Result<SubmapId> id =
-      collection_.insert(builder_.header(), slot_, builder_.from_before(), builder_.stretch());
+  const Result<SubmapId> id = collection_.insert(builder_.header(), slot_, builder_.from_before(), builder_.stretch());
   rendered_ = false;
   if (!id.ok()) {
     ++statistics_.submaps_lost;

@@ -29,7 +29,7 @@ struct OdometryEdgeNoise {
 struct CollectionConfig {
   std::uint32_t max_submaps = 512;
   std::uint16_t max_sessions = 16;
-  std::uint8_t candidates = 4;        ///< of a new submap that are registered, best first, one a place
+  std::uint8_t candidates = 4;  ///< of a new submap that are registered, best first, one a place
   /// Of those, so many are taken for where the graph has them, nearest first, and not for their digests: along a
   /// corridor all digests are alike.
   std::uint8_t nearby_candidates = 1;

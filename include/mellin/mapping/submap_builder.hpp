@@ -110,7 +110,7 @@ class SubmapBuilder {
 
   void swap_poses();
   void place();
-  Pose2 measured_step(std::uint32_t shared) const;
+  static Pose2 measured_step(Span<const Pose2> before, Span<const Pose2> here);
   void render_band(const ScanMemory& scans);
   Range open_range(const LocalMapper& mapper) const;
   Range ended_range(const LocalMapper& mapper) const;
