@@ -38,7 +38,7 @@ struct ScanMatcherConfig {
   float recovery_angle_step_rad = 0.0349065850F;
   /// What it finds must be clearer than an ordinary match, since chance has more poses to choose from: so many of the
   /// beams end near something solid, and the score is better by so much.
-  float recovery_inlier_share = 0.8F;
+  float recovery_inlier_share = 0.9F;
   float recovery_gain = 0.1F;
 };
 
