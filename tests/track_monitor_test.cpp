@@ -130,8 +130,11 @@ TEST_CASE("what contradicts: shares of what the map knows, beams through walls t
   CHECK(monitor.contradicts(agreement(0, 8, 0)));
   CHECK_FALSE(monitor.contradicts({11, 0, 5, 6}));
   CHECK(monitor.contradicts({12, 0, 6, 6}));
-  CHECK(monitor.suspects(agreement(45, 5, 0)));  // a tenth
-  CHECK_FALSE(monitor.suspects(agreement(46, 5, 0)));
+  CHECK(monitor.suspects(agreement(45, 0, 5)));  // a tenth went through walls
+  CHECK_FALSE(monitor.suspects(agreement(46, 0, 5)));
+  CHECK_FALSE(monitor.suspects(agreement(45, 5, 0)));  // somebody stands there …
+  CHECK_FALSE(monitor.suspects(agreement(36, 14, 0)));
+  CHECK(monitor.suspects(agreement(34, 16, 0)));  // … but so many people?
   TrackMonitorConfig off;
   off.lost_scans = 0;
   TrackMonitor never(off);

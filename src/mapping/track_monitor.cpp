@@ -10,15 +10,21 @@ constexpr int kThroughWeight = 2;        // nobody steps aside and leaves a wall
 
 bool TrackMonitor::suspects(const MapAgreement& agreement) const {
   const auto known = static_cast<float>(agreement.agreeing + agreement.conflicts());
-  return config_.lost_scans > 0 && agreement.beams >= kFewBeams && agreement.conflicts() > 0 &&
-         static_cast<float>(agreement.conflicts()) >= config_.suspect_share * known;
+  const bool through = speaks(agreement) && agreement.through > 0 &&
+                       static_cast<float>(agreement.through) >= config_.suspect_share * known;
+  return through || contradicts(agreement);
 }
 
 bool TrackMonitor::contradicts(const MapAgreement& agreement) const {
   const auto known = static_cast<float>(agreement.agreeing + agreement.conflicts());
   const auto against = static_cast<float>(agreement.short_of + kThroughWeight * agreement.through);
-  return suspects(agreement) && against >= config_.conflict_share * known &&
+  return speaks(agreement) && agreement.conflicts() > 0 && against >= config_.conflict_share * known &&
          static_cast<float>(agreement.conflicts()) >= config_.least_share * static_cast<float>(agreement.beams);
+}
+
+/// Whether it has anything to say, and is asked.
+bool TrackMonitor::speaks(const MapAgreement& agreement) const {
+  return config_.lost_scans > 0 && agreement.beams >= kFewBeams;
 }
 
 TrackState TrackMonitor::judge(bool matched, const MapAgreement& agreement) {

@@ -21,7 +21,8 @@ struct TrackMonitorConfig {
   float least_share = 0.12F;
   /// A doubt ends with a match at which so many beams agree.
   float sure_share = 0.7F;
-  /// Where so many of those that the map knows are in conflict, the pose is looked for in a wider search.
+  /// Where so many of those that the map knows went through something, or the scan contradicts, the pose is looked for
+  /// in a wider search. Beams that end early do not suffice: somebody stands there.
   float suspect_share = 0.1F;
 };
 
@@ -51,6 +52,8 @@ class TrackMonitor {
   TrackState judge(bool matched, const MapAgreement& agreement);
 
  private:
+  bool speaks(const MapAgreement& agreement) const;
+
   TrackMonitorConfig config_;
   std::uint8_t doubts_ = 0;  ///< scans in a row
 };
