@@ -260,7 +260,7 @@ TEST_CASE("along a plain corridor the way is that of the odometry, unless the se
   const double loose = shortened(0.0F);
   CAPTURE(held);
   CAPTURE(loose);
-  CHECK(std::fabs(held) < 0.02);
+  CHECK(std::fabs(held) < 0.008);
   CHECK(loose > 2.0 * std::fabs(held));
 }
 

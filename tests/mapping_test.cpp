@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "mapping/surface.hpp"
 #include "mellin/mapping/particle_mapper.hpp"
 #include "mellin/mapping/scan_matcher.hpp"
 #include "mellin/mapping/scan_memory.hpp"
@@ -265,6 +266,33 @@ TEST_CASE("in a plain corridor the scan says where the robot is across and how i
     CHECK(own.xx < 0.02 * own.yy);
     CHECK(own.tt > 100.0);
   }
+}
+
+TEST_CASE("normals of surfaces: of near walls, of walls that beams graze, of single ends none") {
+  using surface::normal;
+  // A wall along x seen from far: the ends lie 0.1 m, then 1 m and more apart; a step of 0.3 m; a pole.
+  const Point2f ends[] = {{0.0F, 1.2F}, {0.1F, 1.2F},  {0.2F, 1.2F},  {0.3F, 1.2F}, {1.2F, 1.2F}, {2.5F, 1.2F},
+                          {4.2F, 1.2F}, {6.4F, 1.25F}, {8.0F, 1.55F}, {5.0F, 0.0F}, {5.0F, 4.0F}};
+  const Span<const Point2f> seen(ends);
+  for (const float unit : {1.0F, 0.05F}) {
+    CAPTURE(unit);
+    std::vector<Point2f> scaled;
+    for (const Point2f& end : ends) {
+      scaled.push_back({end.x / unit, end.y / unit});
+    }
+    const Span<const Point2f> of(scaled.data(), scaled.size());
+    for (const std::size_t on_wall : {1U, 2U, 4U, 5U, 6U}) {
+      CAPTURE(on_wall);
+      CHECK(std::fabs(normal(of, on_wall, unit).x) < 0.02F);
+      CHECK(std::fabs(normal(of, on_wall, unit).y) > 0.999F);
+    }
+    for (const std::size_t single : {7U, 8U, 9U, 10U}) {  // off the line of its neighbours, or too far from them
+      CAPTURE(single);
+      CHECK(normal(of, single, unit).x == 0.0F);
+      CHECK(normal(of, single, unit).y == 0.0F);
+    }
+  }
+  CHECK(normal(seen.first(1), 0, 1.0F).y == 0.0F);
 }
 
 TEST_CASE("no points, and an empty map: the prior stays, and the match is not good") {
