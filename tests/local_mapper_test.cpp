@@ -10,10 +10,12 @@
 #include "mellin/core/random.hpp"
 #include "mellin/mapping/particle_mapper.hpp"
 #include "mellin/mapping/submap_builder.hpp"
+#include "tests/support/carved.hpp"
 #include "tests/support/cell_map.hpp"
 #include "tests/support/room.hpp"
 
 using namespace mellin;
+using mellin::test::give;
 using mellin::test::measure;
 using mellin::test::room;
 using mellin::test::span;
@@ -21,15 +23,6 @@ using mellin::test::span;
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
-template <class Part, class Config>
-typename Part::Memory give(std::vector<std::uint64_t>& words, const Config& config) {
-  MeasureArena measured;
-  (void)Part::carve(measured, config);
-  words.assign(measured.use().total() / 8, 0);
-  Arena arena({reinterpret_cast<std::byte*>(words.data()), words.size() * 8});
-  return Part::carve(arena, config);
-}
 
 struct Drive {
   struct Step {

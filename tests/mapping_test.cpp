@@ -9,6 +9,7 @@
 #include "mellin/mapping/particle_mapper.hpp"
 #include "mellin/mapping/scan_matcher.hpp"
 #include "mellin/mapping/scan_memory.hpp"
+#include "tests/support/carved.hpp"
 #include "tests/support/room.hpp"
 
 using namespace mellin;
@@ -28,11 +29,7 @@ struct Memory {
   std::vector<std::uint64_t> words;
   template <class Part, class Config>
   typename Part::Memory give(const Config& config) {
-    MeasureArena measured;
-    (void)Part::carve(measured, config);
-    words.assign(measured.use().total() / 8, 0);
-    Arena arena({reinterpret_cast<std::byte*>(words.data()), words.size() * 8});
-    return Part::carve(arena, config);
+    return test::give<Part>(words, config);
   }
 };
 

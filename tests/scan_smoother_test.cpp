@@ -8,25 +8,18 @@
 #include <vector>
 
 #include "mellin/core/random.hpp"
+#include "tests/support/carved.hpp"
 #include "tests/support/room.hpp"
 
 using namespace mellin;
 using mellin::test::corridor;
+using mellin::test::give;
 using mellin::test::measure;
 using mellin::test::room;
 using mellin::test::span;
 using mellin::test::Walls;
 
 namespace {
-
-template <class Part, class Config>
-typename Part::Memory give(std::vector<std::uint64_t>& words, const Config& config) {
-  MeasureArena measured;
-  (void)Part::carve(measured, config);
-  words.assign(measured.use().total() / 8, 0);
-  Arena arena({reinterpret_cast<std::byte*>(words.data()), words.size() * 8});
-  return Part::carve(arena, config);
-}
 
 /// Scans of a world from true poses, and a smoother for them.
 struct Bench {
