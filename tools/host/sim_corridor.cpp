@@ -19,9 +19,10 @@ struct Stretch {
 /// Stretches of 10 to 20 m of a span that are bare on both sides.
 std::vector<Stretch> bare_stretches(double length_m, Random& layout) {
   std::vector<Stretch> bare;
-  for (double along = between_limits(layout, 5.0, kBareEvery_m); along < length_m;
-       along += between_limits(layout, 0.7, 1.3) * kBareEvery_m) {
+  double along = between_limits(layout, 5.0, kBareEvery_m);
+  while (along < length_m) {
     bare.push_back({along, along + between_limits(layout, 10.0, 20.0)});
+    along += between_limits(layout, 0.7, 1.3) * kBareEvery_m;
   }
   return bare;
 }
