@@ -146,14 +146,14 @@ TEST_CASE("along a corridor the local mapper's steps stand; across it and in hea
     way.push_back({0.5 * i, 0.0, 0.0});
   }
   Bench bench(corridor(), way, loose_steps());
-  std::vector<Pose2> wrong = way;
+  std::vector<Pose2> wrong;
   for (int i = 0; i < 20; ++i) {
-    wrong[i] = {0.52 * i, 0.02 * ((i % 3) - 1), 0.004 * ((i % 2) - 0.5)};  // reads 4 % too long
+    wrong.push_back({0.52 * i, 0.02 * ((i % 3) - 1), 0.004 * ((i % 2) - 0.5)});  // reads 4 % too long
   }
   const std::vector<Pose2> after = bench.smoothed(wrong);
   for (int i = 0; i < 20; ++i) {
     CAPTURE(i);
-    const Pose2 seen = between(after[10], after[i]);
+    const Pose2 seen = between(after[10], after[static_cast<std::size_t>(i)]);
     CHECK(std::fabs(seen.x - 0.52 * (i - 10)) < 0.01);
     CHECK(std::fabs(seen.y) < 0.004);
     CHECK(std::fabs(seen.theta) < 0.001);

@@ -106,7 +106,7 @@ class Pass {
 
 void mapping(benchmark::State& state, int number, Of of) {
   const mellin::Config config = profile(number);
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     Pass pass(config);
     for (const mellin::host::SimScan& scan : drive().scans) {
       pass.add(scan);

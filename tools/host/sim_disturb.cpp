@@ -95,7 +95,8 @@ class Disturber {
   }
 
   void stop() {
-    for (double stood = kStandingScan_s; stood <= kStop_s; stood += kStandingScan_s) {
+    const double until = now().seconds + kStop_s;
+    while (now().seconds + kStandingScan_s <= until) {
       moves_.push_back({{now().seconds + kStandingScan_s, now().pose}, {}, false});
     }
   }

@@ -65,8 +65,9 @@ void Drive::follow(const std::vector<Point2>& line) {
     heading = theta;
     const double length = distance(from, to);
     double along = 0.0;
-    for (; length - along >= rest; rest = spacing_m_) {
+    while (length - along >= rest) {
       along += rest;
+      rest = spacing_m_;
       const Point2 at = between_points(from, to, along / length);
       move_to({at.x, at.y, theta});
     }

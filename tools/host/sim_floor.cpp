@@ -77,11 +77,7 @@ std::vector<WallSegment> sides_of(const Furniture& box) {
   const double y = box.width_m / 2.0;
   const Point2 corners[4] = {transform(box.world_T_box, -x, -y), transform(box.world_T_box, x, -y),
                              transform(box.world_T_box, x, y), transform(box.world_T_box, -x, y)};
-  std::vector<WallSegment> sides;
-  for (int i = 0; i < 4; ++i) {
-    sides.push_back({corners[i], corners[(i + 1) % 4]});
-  }
-  return sides;
+  return {{corners[0], corners[1]}, {corners[1], corners[2]}, {corners[2], corners[3]}, {corners[3], corners[0]}};
 }
 
 double distance(const Furniture& box, const WallSegment& way) {

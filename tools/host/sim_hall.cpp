@@ -15,14 +15,15 @@ constexpr double kGate_m = 4.0;
 /// The outer wall, with gates that stand back at random places.
 void add_outer_wall(Floor& floor, const Pose2& corner, double length_m, Random& layout) {
   double from = 0.0;
-  for (double at = between_limits(layout, 3.0, 12.0); at < length_m - kGate_m - 1.0;
-       at += kGate_m + between_limits(layout, 4.0, 20.0)) {
+  double at = between_limits(layout, 3.0, 12.0);
+  while (at < length_m - kGate_m - 1.0) {
     const double depth = between_limits(layout, 0.3, 1.2);
     add_wall(floor, corner, from, 0.0, at, 0.0);
     add_wall(floor, corner, at, 0.0, at, -depth);
     add_wall(floor, corner, at, -depth, at + kGate_m, -depth);
     add_wall(floor, corner, at + kGate_m, -depth, at + kGate_m, 0.0);
     from = at + kGate_m;
+    at = from + between_limits(layout, 4.0, 20.0);
   }
   add_wall(floor, corner, from, 0.0, length_m, 0.0);
 }
