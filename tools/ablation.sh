@@ -2,10 +2,11 @@
 # What each part of the method is worth: maps the real logs and two simulated ones with each part switched off in turn,
 # and prints a line a variant: ATE, mean of the relations where there are any, m, and seconds, log by log.
 # usage: tools/ablation.sh [VARIANT…]      all without one; they are named below
-# Logs: $MELLIN_DATA, else ../shared/data, as in tools/accuracy.sh. Two runs at a time; results in build/ablation.
+# Logs: $MELLIN_DATA, else ../shared/data, as in tools/accuracy.sh. MELLIN is the program (build/host/bin/mellin). Two runs
+# at a time; results in build/ablation.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-mellin=$PWD/build/host/bin/mellin
+mellin=${MELLIN:-$PWD/build/host/bin/mellin}
 out=$PWD/build/ablation
 
 options() {  # of a variant
