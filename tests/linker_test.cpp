@@ -27,12 +27,13 @@ struct Bench {
   GraphRig rig;
   std::vector<NodeScans> scans;
   std::vector<PendingLink> memory;
+  std::vector<LoopHypothesis> group;
   Linker linker;
   std::vector<Verdict> verdicts;
 
   explicit Bench(const LinkerConfig& config = {}, const PoseGraphConfig& graph = {})
-      : rig(graph), memory(config.pending) {
-    linker = Linker(config, {{memory.data(), memory.size()}});
+      : rig(graph), memory(config.pending), group(config.pending) {
+    linker = Linker(config, {{memory.data(), memory.size()}, {group.data(), group.size()}});
   }
   /// A session of `count` submaps, each of 40 scans, `new_scans` of them new.
   void session(std::uint32_t count, double sigma_m, double sigma_rad, std::uint32_t new_scans = 40) {
@@ -60,11 +61,19 @@ struct Bench {
     options.max_iterations = 0;
     options.marginals = true;
     REQUIRE(rig.optimise(options).status == Status::ok);
-    return linker.decide(
+    linker.begin(
         rig.graph, rig.optimiser, {scans.data(), scans.size()}, this,
         [](void* context, const PendingLink& link, EdgeId edge) {
           static_cast<Bench*>(context)->verdicts.push_back({link.hypothesis.a, link.hypothesis.b, link.reason, edge});
         });
+    const std::size_t n = linker.pending();
+    std::size_t steps = 1;
+    while (linker.step()) {
+      ++steps;
+    }
+    CHECK(steps <= 2 * n * n + n + 3);
+    CHECK_FALSE(linker.deciding());
+    return linker.added();
   }
 };
 

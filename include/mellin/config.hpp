@@ -123,7 +123,7 @@ constexpr Config micro_profile() {
   c.registration.alignment.max_points = 1024;
   c.registration.alignment.keep_both = false;
   c.collection.graph.max_edges = 512;
-  c.collection.graph.max_fill = 1024;
+  c.collection.graph.max_fill = 2048;
   c.collection.linker.pending = 32;
   return c;
 }

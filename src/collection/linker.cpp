@@ -31,35 +31,29 @@ bool share_scans(const NodeScans& a, const NodeScans& b) {
          b.first < std::uint64_t{a.first} + a.count && a.count > 0 && b.count > 0;
 }
 
-struct Linker::Query {
-  const PoseGraph* graph;
-  Optimiser* optimiser;
-  Span<const NodeScans> scans;
-
-  static Status relative(void* context, NodeId from, NodeId to, RelativePose& out) {
-    const Query& self = *static_cast<const Query*>(context);
-    if (self.graph->component(from) != self.graph->component(to)) {
-      return Status::degenerate;
-    }
-    out.a_T_b = between(self.graph->pose(from), self.graph->pose(to));
-    if (from == to) {
-      out.covariance = Sym3{};
-      return Status::ok;
-    }
-    const Result<Sym3> covariance = self.optimiser->relative_covariance(from, to);
-    if (!covariance.ok()) {
-      return covariance.status();
-    }
-    out.covariance = covariance.value();
+Status Linker::relative(void* context, NodeId from, NodeId to, RelativePose& out) {
+  const Case& self = *static_cast<const Case*>(context);
+  if (self.graph->component(from) != self.graph->component(to)) {
+    return Status::degenerate;
+  }
+  out.a_T_b = between(self.graph->pose(from), self.graph->pose(to));
+  if (from == to) {
+    out.covariance = Sym3{};
     return Status::ok;
   }
-
-  static bool shared(void* context, const LoopHypothesis& first, const LoopHypothesis& second) {
-    const Query& self = *static_cast<const Query*>(context);
-    return share_scans(self.scans[first.a], self.scans[second.a]) ||
-           share_scans(self.scans[first.b], self.scans[second.b]);
+  const Result<Sym3> covariance = self.optimiser->relative_covariance(from, to);
+  if (!covariance.ok()) {
+    return covariance.status();
   }
-};
+  out.covariance = covariance.value();
+  return Status::ok;
+}
+
+bool Linker::shared(void* context, const LoopHypothesis& first, const LoopHypothesis& second) {
+  const Case& self = *static_cast<const Case*>(context);
+  return share_scans(self.scans[first.a], self.scans[second.a]) ||
+         share_scans(self.scans[first.b], self.scans[second.b]);
+}
 
 namespace {
 
@@ -69,6 +63,8 @@ constexpr double kDemandGrowth = 3.0;
 /// late and mends much.
 constexpr double kReserveFrom = 0.9;
 constexpr double kReserveDemand = 8.0;
+/// Nodes of the search for a set, which bounds a slice. Sets that decide anything are found within far fewer.
+constexpr std::uint32_t kSearchLimit = 500;
 constexpr double kLn2 = 0.69314718055994530942;
 
 /// Each node that may still come needs room for its odometry edge.
@@ -139,58 +135,95 @@ bool Linker::known_well(const Sym3& covariance) const {
   return covariance.xx <= m * m && covariance.yy <= m * m && covariance.tt <= rad * rad;
 }
 
-std::size_t Linker::decide(PoseGraph& graph, Optimiser& optimiser, Span<const NodeScans> scans, void* context,
-                           Decided decided) {
-  Query query{&graph, &optimiser, scans};
+void Linker::begin(PoseGraph& graph, Optimiser& optimiser, Span<const NodeScans> scans, void* context,
+                   Decided decided) {
   const double min_gain_bits = static_cast<double>(config_.min_gain_bits) * demand(room_taken(graph, optimiser));
-  std::uint64_t alone = 0;     // suffice alone
-  std::uint64_t eligible = 0;  // may be in a set
-  for (std::size_t i = 0; i < pending_.size();) {
-    PendingLink& link = pending_[i];
-    const LoopHypothesis& h = link.hypothesis;
-    const std::uint64_t bit = std::uint64_t{1} << i;
-    const LinkReason before = link.reason;
-    RelativePose in_map;
-    if (graph.component(h.a) != graph.component(h.b)) {
-      link.reason = LinkReason::waiting;
-      eligible |= bit;
-    } else if (Query::relative(&query, h.a, h.b, in_map) == Status::ok) {
-      link.graph_chi2 = hypothesis_chi2(h.measured, in_map);
-      const bool fits = link.graph_chi2 <= config_.graph_gate_chi2;
-      link.reason = fits ? LinkReason::waiting : LinkReason::contradicts_map;
-      const Sym3 of_edge = scale(h.measured.covariance, 1.0 / static_cast<double>(config_.information_share));
-      if (fits && min_gain_bits > 0.0 && tells_too_little(of_edge, in_map.covariance, min_gain_bits)) {
-        link.reason = LinkReason::redundant;
-        decided(context, link, kNoId);
-        pending_.erase(i);
-        continue;
-      }
-      eligible |= fits ? bit : 0;
-      alone |= fits && known_well(in_map.covariance) && link.agreement >= config_.single_agreement ? bit : 0;
-    }
-    if (link.reason != before) {
-      decided(context, link, kNoId);
-    }
-    ++i;
-  }
-  if (alone != 0) {
-    return accept(graph, scans, alone, LinkReason::confirmed_by_map, context, decided);
-  }
-  for (std::size_t i = pending_.size(); i-- > 0;) {
-    if ((eligible >> i & 1U) == 0) {
-      continue;
-    }
-    const Group group = same_components(graph, i, eligible);
-    const std::uint64_t set = confirmed(query, group);
-    if (set != 0) {
-      return accept(graph, scans, set, LinkReason::confirmed_by_set, context, decided);
-    }
-    eligible &= ~group.members;  // from another of its hypotheses the same group would be asked the same again
-  }
-  return 0;
+  case_ = {&graph, &optimiser, scans, context, decided, min_gain_bits};
+  next_ = 0;
+  alone_ = 0;
+  eligible_ = 0;
+  added_ = 0;
+  stage_ = Stage::weigh;
 }
 
-Linker::Group Linker::same_components(const PoseGraph& graph, std::size_t index, std::uint64_t eligible) const {
+bool Linker::step() {
+  switch (stage_) {
+    case Stage::idle:
+      break;
+    case Stage::weigh:
+      if (next_ < pending_.size()) {
+        weigh_next();
+      } else if (alone_ != 0) {
+        accept(alone_, LinkReason::confirmed_by_map);
+        stage_ = Stage::idle;
+      } else {
+        next_group();
+      }
+      break;
+    case Stage::search:
+      if (!search_.step()) {
+        finish_group();
+      }
+      break;
+  }
+  return stage_ != Stage::idle;
+}
+
+/// One hypothesis against the graph.
+void Linker::weigh_next() {
+  PendingLink& link = pending_[next_];
+  const LoopHypothesis& h = link.hypothesis;
+  const std::uint64_t bit = std::uint64_t{1} << next_;
+  const LinkReason before = link.reason;
+  RelativePose in_map;
+  if (case_.graph->component(h.a) != case_.graph->component(h.b)) {
+    link.reason = LinkReason::waiting;
+    eligible_ |= bit;
+  } else if (relative(&case_, h.a, h.b, in_map) == Status::ok) {
+    link.graph_chi2 = hypothesis_chi2(h.measured, in_map);
+    const bool fits = link.graph_chi2 <= config_.graph_gate_chi2;
+    link.reason = fits ? LinkReason::waiting : LinkReason::contradicts_map;
+    const Sym3 of_edge = scale(h.measured.covariance, 1.0 / static_cast<double>(config_.information_share));
+    if (fits && case_.min_gain_bits > 0.0 && tells_too_little(of_edge, in_map.covariance, case_.min_gain_bits)) {
+      link.reason = LinkReason::redundant;
+      case_.decided(case_.context, link, kNoId);
+      pending_.erase(next_);
+      return;
+    }
+    eligible_ |= fits ? bit : 0;
+    alone_ |= fits && known_well(in_map.covariance) && link.agreement >= config_.single_agreement ? bit : 0;
+  }
+  if (link.reason != before) {
+    case_.decided(case_.context, link, kNoId);
+  }
+  ++next_;
+}
+
+/// The group of the last of the eligible ones; none is left: all is judged.
+void Linker::next_group() {
+  if (eligible_ == 0) {
+    stage_ = Stage::idle;
+    return;
+  }
+  group_ = same_components(63U - static_cast<std::size_t>(__builtin_clzll(eligible_)));
+  std::size_t count = 0;
+  for (std::uint64_t left = group_.members; left != 0; left &= left - 1) {
+    candidates_[count++] = pending_[static_cast<std::size_t>(__builtin_ctzll(left))].hypothesis;
+  }
+  ConsistencyOptions options;
+  options.gate_chi2 = config_.pair_gate_chi2;
+  options.search_limit = kSearchLimit;
+  const Status status = search_.begin(candidates_.first(count), {&case_, relative, shared}, options);
+  if (status == Status::ok) {
+    stage_ = Stage::search;
+  } else {
+    eligible_ &= ~group_.members;
+    stage_ = Stage::weigh;
+  }
+}
+
+Linker::Group Linker::same_components(std::size_t index) const {
+  const PoseGraph& graph = *case_.graph;
   const LoopHypothesis& seed = pending_[index].hypothesis;
   const NodeId ca = graph.component(seed.a);
   const NodeId cb = graph.component(seed.b);
@@ -200,41 +233,32 @@ Linker::Group Linker::same_components(const PoseGraph& graph, std::size_t index,
     const LoopHypothesis& h = pending_[i].hypothesis;
     const NodeId da = graph.component(h.a);
     const NodeId db = graph.component(h.b);
-    if ((eligible >> i & 1U) != 0 && ((da == ca && db == cb) || (da == cb && db == ca))) {
+    if ((eligible_ >> i & 1U) != 0 && ((da == ca && db == cb) || (da == cb && db == ca))) {
       group.members |= std::uint64_t{1} << i;
     }
   }
   return group;
 }
 
-std::uint64_t Linker::confirmed(Query& query, const Group& group) const {
-  LoopHypothesis candidates[kMaxHypotheses];
-  std::size_t places[kMaxHypotheses] = {};
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < pending_.size(); ++i) {
-    if ((group.members >> i & 1U) != 0) {
-      places[count] = i;
-      candidates[count++] = pending_[i].hypothesis;
-    }
-  }
-  ConsistencyOptions options;
-  options.gate_chi2 = config_.pair_gate_chi2;
-  const Result<ConsistentSet> set =
-      find_consistent(Span<const LoopHypothesis>(candidates, count), {&query, Query::relative, Query::shared}, options);
-  const std::uint32_t needed = group.merges ? config_.merge_witnesses : config_.loop_witnesses;
-  if (!set.ok() || set.value().witness_count < needed) {
-    return 0;
+void Linker::finish_group() {
+  const ConsistentSet& set = search_.result();
+  const std::uint32_t needed = group_.merges ? config_.merge_witnesses : config_.loop_witnesses;
+  if (set.witness_count < needed) {
+    eligible_ &= ~group_.members;  // from another of its hypotheses the same group would be asked the same again
+    stage_ = Stage::weigh;
+    return;
   }
   std::uint64_t members = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    members |= (set.value().members >> i & 1U) != 0 ? std::uint64_t{1} << places[i] : 0;
+  std::size_t place = 0;
+  for (std::uint64_t left = group_.members; left != 0; left &= left - 1, ++place) {
+    members |= (set.members >> place & 1U) != 0 ? left & (~left + 1) : 0;
   }
-  return members;
+  accept(members, LinkReason::confirmed_by_set);
+  stage_ = Stage::idle;
 }
 
-std::size_t Linker::accept(PoseGraph& graph, Span<const NodeScans> scans, std::uint64_t members, LinkReason reason,
-                           void* context, Decided decided) {
-  std::size_t added = 0;
+void Linker::accept(std::uint64_t members, LinkReason reason) {
+  PoseGraph& graph = *case_.graph;
   for (std::size_t i = pending_.size(); i-- > 0;) {
     if ((members >> i & 1U) == 0) {
       continue;
@@ -246,19 +270,18 @@ std::size_t Linker::accept(PoseGraph& graph, Span<const NodeScans> scans, std::u
       continue;  // the hypothesis keeps waiting
     }
     if (information_from_covariance(h.measured.a_T_b, h.measured.covariance, information)) {
-      const EdgeKind kind = scans[h.a].session == scans[h.b].session ? EdgeKind::loop : EdgeKind::merge;
+      const EdgeKind kind = case_.scans[h.a].session == case_.scans[h.b].session ? EdgeKind::loop : EdgeKind::merge;
       const Result<EdgeId> edge = graph.add_edge(h.a, h.b, kind, h.measured.a_T_b,
                                                  scale(information, static_cast<double>(config_.information_share)));
       if (!edge.ok()) {
         continue;
       }
       link.reason = reason;
-      decided(context, link, edge.value());
-      ++added;
+      case_.decided(case_.context, link, edge.value());
+      ++added_;
     }
     pending_.erase(i);
   }
-  return added;
 }
 
 }  // namespace mellin

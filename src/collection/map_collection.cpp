@@ -411,9 +411,14 @@ void MapCollection::judge() {
     event.reason = link.reason;
     self.report(event);
   };
-  const std::size_t added = linker_.decide(graph_, optimiser_, memory_.scans.first(count_), this, decided);
-  statistics_.pairs_accepted += added;
-  if (added == 0) {
+  if (!linker_.deciding()) {
+    linker_.begin(graph_, optimiser_, memory_.scans.first(count_), this, decided);
+  }
+  if (linker_.step()) {
+    return;
+  }
+  statistics_.pairs_accepted += linker_.added();
+  if (linker_.added() == 0) {
     finish_submap();
     return;
   }

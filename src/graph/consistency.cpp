@@ -83,10 +83,12 @@ double pair_chi2(const RelativePose& z1, const RelativePose& b1_T_b2, const Rela
   return identity_chi2(loop.a_T_b, loop.covariance);
 }
 
-Result<ConsistentSet> find_consistent(Span<const LoopHypothesis> hypotheses, const MapQuery& map,
-                                      const ConsistencyOptions& options) {
-  const std::size_t n = hypotheses.size();
-  if (n > kMaxHypotheses || map.relative == nullptr || !positive(options.gate_chi2) || options.search_limit == 0) {
+Status ConsistencySearch::begin(Span<const LoopHypothesis> hypotheses, const MapQuery& map,
+                                const ConsistencyOptions& options) {
+  stage_ = Stage::done;
+  set_ = ConsistentSet{};
+  if (hypotheses.size() > kMaxHypotheses || map.relative == nullptr || !positive(options.gate_chi2) ||
+      options.search_limit == 0) {
     return Status::invalid_argument;
   }
   for (const LoopHypothesis& h : hypotheses) {
@@ -94,30 +96,76 @@ Result<ConsistentSet> find_consistent(Span<const LoopHypothesis> hypotheses, con
       return Status::bad_data;
     }
   }
-  LinkMatrix consistent;
-  LinkMatrix independent;  // consistent, and no scans shared: a clique of it is a set of witnesses
-  for (std::size_t i = 0; i < n; ++i) {
-    for (std::size_t j = i + 1; j < n; ++j) {
-      if (agree(map, hypotheses[i], hypotheses[j], options.gate_chi2)) {
-        link(consistent, i, j);
-        if (!share_scans(map, hypotheses[i], hypotheses[j])) {
-          link(independent, i, j);
-        }
-      }
+  hypotheses_ = hypotheses;
+  map_ = map;
+  options_ = options;
+  consistent_ = LinkMatrix{};
+  independent_ = LinkMatrix{};
+  first_ = 0;
+  second_ = 1;
+  stage_ = hypotheses.size() < 2 ? Stage::witnesses : Stage::pairs;
+  return Status::ok;
+}
+
+std::uint64_t ConsistencySearch::all() const {
+  const std::size_t n = hypotheses_.size();
+  return n == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << n) - 1;
+}
+
+bool ConsistencySearch::step() {
+  std::uint32_t limit = options_.search_limit;
+  switch (stage_) {
+    case Stage::pairs:
+      compare();
+      break;
+    case Stage::witnesses:
+      set_.witnesses = maximum_clique(independent_, all(), limit);
+      set_.exact = limit > 0;
+      stage_ = Stage::others;
+      break;
+    case Stage::others: {
+      const std::uint64_t others = linked_to_all(consistent_, set_.witnesses, all() & ~set_.witnesses);
+      set_.members = set_.witnesses | maximum_clique(consistent_, others, limit);
+      set_.exact = set_.exact && limit > 0;
+      set_.member_count = static_cast<std::uint32_t>(__builtin_popcountll(set_.members));
+      set_.witness_count = static_cast<std::uint32_t>(__builtin_popcountll(set_.witnesses));
+      stage_ = Stage::done;
+      break;
+    }
+    case Stage::done:
+      break;
+  }
+  return stage_ != Stage::done;
+}
+
+/// The next pair.
+void ConsistencySearch::compare() {
+  const LoopHypothesis& first = hypotheses_[first_];
+  const LoopHypothesis& second = hypotheses_[second_];
+  if (agree(map_, first, second, options_.gate_chi2)) {
+    link(consistent_, first_, second_);
+    if (!share_scans(map_, first, second)) {
+      link(independent_, first_, second_);
     }
   }
-  const std::uint64_t all = n == 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << n) - 1;
-  std::uint32_t limit = options.search_limit;
-  ConsistentSet set;
-  set.witnesses = maximum_clique(independent, all, limit);
-  set.exact = limit > 0;
-  limit = options.search_limit;
-  const std::uint64_t others = linked_to_all(consistent, set.witnesses, all & ~set.witnesses);
-  set.members = set.witnesses | maximum_clique(consistent, others, limit);
-  set.exact = set.exact && limit > 0;
-  set.member_count = static_cast<std::uint32_t>(__builtin_popcountll(set.members));
-  set.witness_count = static_cast<std::uint32_t>(__builtin_popcountll(set.witnesses));
-  return set;
+  ++second_;
+  if (second_ == hypotheses_.size()) {
+    ++first_;
+    second_ = static_cast<std::uint8_t>(first_ + 1);
+    stage_ = second_ == hypotheses_.size() ? Stage::witnesses : Stage::pairs;
+  }
+}
+
+Result<ConsistentSet> find_consistent(Span<const LoopHypothesis> hypotheses, const MapQuery& map,
+                                      const ConsistencyOptions& options) {
+  ConsistencySearch search;
+  const Status status = search.begin(hypotheses, map, options);
+  if (status != Status::ok) {
+    return status;
+  }
+  while (search.step()) {
+  }
+  return search.result();
 }
 
 }  // namespace mellin

@@ -84,44 +84,77 @@ class Linker {
  public:
   struct Memory {
     Span<PendingLink> pending;
+    Span<LoopHypothesis> group;  ///< those of them that are compared
   };
   template <class A>
   static constexpr Memory carve(A& arena, const LinkerConfig& config) {
-    return {arena.template take<PendingLink>(config.pending, Part::collection)};
+    return {arena.template take<PendingLink>(config.pending, Part::collection),
+            arena.template take<LoopHypothesis>(config.pending, Part::collection)};
   }
   Linker() = default;
-  Linker(const LinkerConfig& config, const Memory& memory) : config_(config), pending_(memory.pending) {}
+  Linker(const LinkerConfig& config, const Memory& memory)
+      : config_(config), pending_(memory.pending), candidates_(memory.group) {}
 
   /// Whether a registered hypothesis is evidence at all.
   bool worth_keeping(const PlaceHypothesis& place) const;
   /// Keeps a hypothesis; where there is no room, the one that agrees least is dropped.
   void add(NodeId a, NodeId b, const PlaceHypothesis& place);
 
-  /// Judges all that waits against the graph, whose marginals must be factorised, and adds edges for what is accepted.
-  /// `scans` has an element a node. Calls decided(context, link, edge) for each verdict that changed (edge kNoId where
-  /// it is not accepted). Returns how many edges were added. Cost: at most 2 pending^2 + pending queries of the graph.
+  /// Starts to judge all that waits against the graph, whose marginals must be factorised and which must stay as it is
+  /// until step() returns false. `scans` has an element a node. Calls decided(context, link, edge) for each verdict
+  /// that changed (edge kNoId where it is not accepted).
   using Decided = void (*)(void* context, const PendingLink& link, EdgeId edge);
-  std::size_t decide(PoseGraph& graph, Optimiser& optimiser, Span<const NodeScans> scans, void* context,
-                     Decided decided);
+  void begin(PoseGraph& graph, Optimiser& optimiser, Span<const NodeScans> scans, void* context, Decided decided);
+  /// One hypothesis against the graph, one pair of them against each other, or one search for a consistent set; in the
+  /// end adds edges for what is accepted. Returns whether there is more. At most 2 pending^2 + pending + 3 steps; at most 4
+  /// queries of the graph a step.
+  bool step();
+  bool deciding() const { return stage_ != Stage::idle; }
+  /// Edges that were added, once step() has returned false.
+  std::size_t added() const { return added_; }
 
   std::size_t pending() const { return pending_.size(); }
-  void clear() { pending_.clear(); }
+  void clear() {
+    pending_.clear();
+    stage_ = Stage::idle;
+  }
 
  private:
-  struct Query;
-  bool known_well(const Sym3& covariance) const;
+  enum class Stage : std::uint8_t { idle, weigh, search };
+  /// What the hypotheses are judged by.
+  struct Case {
+    PoseGraph* graph = nullptr;
+    Optimiser* optimiser = nullptr;
+    Span<const NodeScans> scans;
+    void* context = nullptr;
+    Decided decided = nullptr;
+    double min_gain_bits = 0.0;
+  };
   /// Waiting hypotheses, a bit each, that link the same two components, or lie in the same one.
   struct Group {
     std::uint64_t members = 0;
     bool merges = false;
   };
-  Group same_components(const PoseGraph& graph, std::size_t index, std::uint64_t eligible) const;
-  std::uint64_t confirmed(Query& query, const Group& group) const;
-  std::size_t accept(PoseGraph& graph, Span<const NodeScans> scans, std::uint64_t members, LinkReason reason,
-                     void* context, Decided decided);
+  static Status relative(void* context, NodeId from, NodeId to, RelativePose& out);
+  static bool shared(void* context, const LoopHypothesis& first, const LoopHypothesis& second);
+  bool known_well(const Sym3& covariance) const;
+  void weigh_next();
+  void next_group();
+  void finish_group();
+  Group same_components(std::size_t index) const;
+  void accept(std::uint64_t members, LinkReason reason);
 
   LinkerConfig config_;
   List<PendingLink> pending_;
+  Span<LoopHypothesis> candidates_;  ///< the group's, in the order of `pending_`
+  Case case_;
+  Stage stage_ = Stage::idle;
+  std::size_t next_ = 0;        ///< of the pending ones
+  std::uint64_t alone_ = 0;     ///< suffice alone
+  std::uint64_t eligible_ = 0;  ///< may be in a set
+  Group group_;
+  ConsistencySearch search_;
+  std::size_t added_ = 0;
 };
 
 }  // namespace mellin

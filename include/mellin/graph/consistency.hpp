@@ -81,10 +81,35 @@ std::uint64_t maximum_clique(const LinkMatrix& links, std::uint64_t candidates, 
 
 /// Tests all pairs of hypotheses, then finds the set of mutually consistent ones with the most independent witnesses
 /// and adds to it as many of the others as agree with all of it and one another. A pair that the map cannot compare is
-/// inconsistent. Two hypotheses that link the same components with their ends exchanged are compared all the same. The
-/// set; invalid_argument with more than kMaxHypotheses, without `relative` or with an option that is not positive;
-/// bad_data where a hypothesis is not finite or its covariance not positive definite. At most 4 relative() calls a
-/// pair.
+/// inconsistent. Two hypotheses that link the same components with their ends exchanged are compared all the same.
+class ConsistencySearch {
+ public:
+  /// Hypotheses and what the map refers to stay the caller's and as they are until the search is over. invalid_argument
+  /// with more than kMaxHypotheses, without `relative` or with an option that is not positive; bad_data where a
+  /// hypothesis is not finite or its covariance not positive definite.
+  Status begin(Span<const LoopHypothesis> hypotheses, const MapQuery& map, const ConsistencyOptions& options);
+  /// One pair, with at most 4 relative() calls, or one of the two searches for a clique. Returns whether there is more.
+  bool step();
+  /// The set, once step() has returned false.
+  const ConsistentSet& result() const { return set_; }
+
+ private:
+  enum class Stage : std::uint8_t { pairs, witnesses, others, done };
+  std::uint64_t all() const;
+  void compare();
+
+  Span<const LoopHypothesis> hypotheses_;
+  MapQuery map_;
+  ConsistencyOptions options_;
+  LinkMatrix consistent_;
+  LinkMatrix independent_;  ///< consistent, and no scans shared: a clique of it is a set of witnesses
+  ConsistentSet set_;
+  Stage stage_ = Stage::done;
+  std::uint8_t first_ = 0;  ///< the pair that is next
+  std::uint8_t second_ = 0;
+};
+
+/// ConsistencySearch in one go: the set, or the statuses of begin().
 Result<ConsistentSet> find_consistent(Span<const LoopHypothesis> hypotheses, const MapQuery& map,
                                       const ConsistencyOptions& options);
 
