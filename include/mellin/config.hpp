@@ -139,6 +139,7 @@ constexpr Config nano_profile() {
   c.max_sessions = 4;
   c.mapper.spare_scans = 4;
   c.mapper.count_once_a_scan = true;
+  c.mapper.monitor.conflict_share = 0.5F;  // in coarse cells a third of the beams contradicts where the robot is right
   c.submaps.band_rows = 4;
   c.submaps.smoother.iterations = 0;  // no room for it
   c.screening.hold_digests = false;

@@ -106,8 +106,8 @@ class Linker {
   using Decided = void (*)(void* context, const PendingLink& link, EdgeId edge);
   void begin(PoseGraph& graph, Optimiser& optimiser, Span<const NodeScans> scans, void* context, Decided decided);
   /// One hypothesis against the graph, one pair of them against each other, or one search for a consistent set; in the
-  /// end adds edges for what is accepted. Returns whether there is more. At most 2 pending^2 + pending + 3 steps; at most 4
-  /// queries of the graph a step.
+  /// end adds edges for what is accepted. Returns whether there is more. At most 2 pending^2 + pending + 3 steps; at
+  /// most 4 queries of the graph a step.
   bool step();
   bool deciding() const { return stage_ != Stage::idle; }
   /// Edges that were added, once step() has returned false.
