@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <functional>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -39,7 +40,7 @@ class GuardedMemory {
 
   explicit GuardedMemory(
       std::size_t size, const Fill& fill = [](std::size_t) { return kGuardByte; })
-      : size_(size), bytes_(static_cast<std::byte*>(std::malloc(size + 2 * kGuard))) {
+      : size_(size), bytes_(allocated(size + 2 * kGuard)) {
     std::fill_n(bytes_, size + 2 * kGuard, kGuardByte);
     for (std::size_t i = 0; i < size; ++i) {
       bytes_[kGuard + i] = fill(i);
@@ -57,6 +58,13 @@ class GuardedMemory {
   }
 
  private:
+  static std::byte* allocated(std::size_t bytes) {
+    if (bytes > ~std::size_t{0} / 2) {
+      throw std::bad_alloc();  // what a configuration needs that no size_t can count
+    }
+    return static_cast<std::byte*>(std::malloc(bytes));
+  }
+
 #if defined(__SANITIZE_ADDRESS__)
   static constexpr std::size_t kGuard = 0;
 #else
