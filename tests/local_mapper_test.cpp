@@ -97,8 +97,10 @@ class FakeMapper final : public LocalMapper {
     const ScanMemoryConfig config{capacity, 90};
     scans_ = ScanMemory(config, give<ScanMemory>(words_, config), {lasers_, kMaxLasers});
   }
-  void take(const Pose2& pose, const Sym3& drift = {}) {
-    const std::vector<float> ranges = measure(room(), pose, lasers_[0]);
+  void take(const Pose2& pose, const Sym3& drift = {}) { take(pose, pose, drift); }
+  /// A scan from `truth` that the mapper believes to be from `pose`.
+  void take(const Pose2& pose, const Pose2& truth, const Sym3& drift) {
+    const std::vector<float> ranges = measure(room(), truth, lasers_[0]);
     scans_.stage({static_cast<std::int64_t>(poses_.size()) * 1000, span(ranges), {}, 0});
     (void)scans_.take_staged();
     poses_.push_back(pose);
@@ -476,6 +478,56 @@ TEST_CASE("the step from the submap before is that of the scans that both hold, 
   take(1);
   (void)freeze();  // scans 7 to 16, of which the one before held nine; but that was another session
   CHECK(b.builder.from_before().shared_scans == 0);
+}
+
+TEST_CASE(
+    "smoothed submaps are joined by where both hold their scans, and their newest scan stays where the robot is") {
+  FakeMapper mapper(40, 24);
+  SubmapBuilderConfig config = builder_config();
+  config.smoother.iterations = 3;
+  config.smoother.max_scans = config.max_scans;
+  config.smoother.max_beams = 90;
+  Builder b(config);
+  std::vector<std::uint8_t> cells(256 * 256);
+  Random random(5, 1);
+  std::vector<std::vector<Pose2>> frozen;
+  std::vector<SubmapHeader> headers;
+  for (int i = 0; i < 16; ++i) {
+    const Pose2 truth{-3.0 + 0.2 * i, 0.3 * std::sin(i), 0.1 * i};
+    const Pose2 seen =
+        compose(truth, {0.02 * random.normal(), 0.02 * random.normal(), 0.005 * random.normal()});  // as mapped
+    mapper.take(seen, truth, Sym3{});
+    (void)b.builder.scan_taken(mapper);
+    if (i != 11 && i != 15) {
+      continue;
+    }
+    REQUIRE(b.builder.begin(mapper, {cells.data(), cells.size()}) == Status::ok);
+    for (bool done = false; !done;) {
+      const Result<bool> step = b.builder.step(mapper.scans());
+      REQUIRE(step.ok());
+      done = step.value();
+    }
+    headers.push_back(b.builder.header());
+    const Span<const Pose2> poses = b.builder.submap_T_scan();
+    frozen.emplace_back(poses.begin(), poses.end());
+    CHECK(translation(between(compose(headers.back().session_T_submap, headers.back().submap_T_robot), seen)) < 1e-9);
+  }
+  // Scans 6 to 11 are in both. Laid on one another by the step they agree on average; by the mapper's poses they do
+  // not.
+  const auto mean_off = [&](const Pose2& step) {
+    Pose2 mean;
+    for (std::size_t i = 0; i < 6; ++i) {
+      const Pose2 here = compose(step, frozen[1][i]);
+      mean = {mean.x + (here.x - frozen[0][i + 4].x) / 6, mean.y + (here.y - frozen[0][i + 4].y) / 6,
+              mean.theta + wrap_angle(here.theta - frozen[0][i + 4].theta) / 6};
+    }
+    return mean;
+  };
+  const SubmapStep step = b.builder.from_before();
+  REQUIRE(step.shared_scans == 6);
+  CHECK(translation(mean_off(step.before_T_submap)) < 1e-9);
+  CHECK(std::fabs(mean_off(step.before_T_submap).theta) < 1e-9);
+  CHECK(translation(mean_off(between(headers[0].session_T_submap, headers[1].session_T_submap))) > 0.002);
 }
 
 TEST_CASE("submaps are due after K scans and then each N, or after so much path, or when drift has added up") {

@@ -17,6 +17,9 @@ options() {  # of a variant
     no-smoothing) echo --set submaps.smoother.iterations=0 ;;
     no-drift-limit) echo --set submaps.max_drift_m=1000 --set submaps.max_drift_rad=1000 ;;
     no-path-limit) echo --set submaps.max_path_m=1000 --set submaps.every_path_m=1000 ;;
+    no-bias) echo --set mapper.odometry.learn_bias=0 ;;
+    no-search-gain) echo --set matcher.search_gain=0 ;;
+    no-monitor) echo --set monitor.lost_scans=0 ;;
     no-nearby) echo --set collection.nearby_candidates=0 ;;
     no-alignment) echo --set registration.alignment.max_iterations=1 ;;
     no-loops) echo --no-loops ;;
@@ -28,7 +31,7 @@ options() {  # of a variant
     *) return 1 ;;
   esac
 }
-all=(default refine-only search-only no-smoothing no-drift-limit no-path-limit no-nearby no-alignment no-loops
+all=(default refine-only search-only no-bias no-search-gain no-monitor no-smoothing no-drift-limit no-path-limit no-nearby no-alignment no-loops
   particles-2 particles-10 particles-30 remember-20 remember-80 hardly-forgetting particles-10-hardly-forgetting)
 
 # One run: ablation.sh --one VARIANT LOG TRUTH [RELATIONS]; writes "ATE/relations/seconds"

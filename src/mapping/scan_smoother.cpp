@@ -14,7 +14,7 @@ constexpr float kHold = 1e8F;          // information that keeps the middle scan
 constexpr double kSettled_m = 5e-4;    // a solution that moves no scan further than this …
 constexpr double kSettled_rad = 1e-4;  // … nor turns it so far is the last
 
-/// The direction of (x, y) to 0.005 rad: it only says where to look (arc tangent after Hastings 1955).
+/// The direction of (x, y) to 0.005 rad, by a cubic for the arc tangent: it only says where to look.
 float rough_direction(float x, float y) {
   const float ax = x < 0.0F ? -x : x;
   const float ay = y < 0.0F ? -y : y;
