@@ -31,8 +31,8 @@ options() {  # of a variant
     *) return 1 ;;
   esac
 }
-all=(default refine-only search-only no-bias no-search-gain no-monitor no-smoothing no-drift-limit no-path-limit no-nearby no-alignment no-loops
-  particles-2 particles-10 particles-30 remember-20 remember-80 hardly-forgetting particles-10-hardly-forgetting)
+all=(default refine-only search-only no-bias no-search-gain no-monitor no-smoothing no-drift-limit no-path-limit no-nearby
+  no-alignment no-loops particles-2 particles-10 particles-30 remember-20 remember-80 hardly-forgetting particles-10-hardly-forgetting)
 
 # One run: ablation.sh --one VARIANT LOG TRUTH [RELATIONS]; writes "ATE/relations/seconds"
 if [ "${1-}" = --one ]; then
