@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "mellin/grid/digest.hpp"
 #include "mellin/spectral/fft2.hpp"
 
 namespace mellin {
@@ -62,6 +63,9 @@ struct MatcherConfig {
   /// Width of the margin that is blended into its cyclically blurred self (IV-A step 1), share of the side, over 0 up
   /// to 0.1.
   float edge_margin = 0.04F;
+  /// What makes the pictures of grids (IV-B2): for those who call DigestMaker; the matcher itself takes pictures as
+  /// they are.
+  Preprocessing preprocessing = Preprocessing::erosion;
   /// How the rotation is found (IV-A step 2). Costs of a comparison: rings least, log_polar_scale a 2D transform more.
   RotationMode rotation = RotationMode::rings;
   /// Weight of magnitudes before the rotation is sought (Fig. 1b).
@@ -80,9 +84,9 @@ constexpr bool is_valid(const MatcherConfig& config) {
          config.peak_share <= 1.0F && config.max_peaks >= 1 && config.max_peaks <= kMaxRotationPeaks &&
          config.com_radius <= 3 && config.lowpass_sigma >= 0.0F && config.lowpass_sigma < 1e3F &&
          config.whitening_floor > 0.0F && config.whitening_floor <= 1.0F && config.edge_margin > 0.0F &&
-         config.edge_margin <= 0.1F && config.rotation <= RotationMode::log_polar_scale &&
-         config.high_pass <= HighPass::reddy && config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F &&
-         config.min_peak <= 1.0F;
+         config.edge_margin <= 0.1F && config.preprocessing <= Preprocessing::blur &&
+         config.rotation <= RotationMode::log_polar_scale && config.high_pass <= HighPass::reddy &&
+         config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F && config.min_peak <= 1.0F;
 }
 
 /// The paper taken at its word: phase-only matched filters without low-pass for rotation with scale and for
