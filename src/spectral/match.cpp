@@ -116,6 +116,12 @@ void Matcher::locate_peak() {
   hypothesis.peak = best_;
   hypothesis.rotation_peak = rotation.strength;
   hypothesis.scale = rotation.scale;
+  const double quarter = 0.25 * static_cast<double>(side);
+  const PeakSpread spread = spread_by_gradient(curvature(window, radius), gradient_noise_, quarter);
+  const double fit = fit_variance(config_, PeakKind::whitened);
+  const double square_m = pixel_m * pixel_m;
+  hypothesis.covariance = {static_cast<float>((spread.xx + fit) * square_m), static_cast<float>(spread.xy * square_m),
+                           static_cast<float>((spread.yy + fit) * square_m), rotation.variance};
   add_hypothesis(hypothesis);
 }
 
