@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "mellin/spectral/matcher.hpp"
+#include "spectral/kernels.hpp"
 #include "spectral/resample.hpp"
 
 namespace mellin {
@@ -26,26 +27,6 @@ bool is_peak(Span<const float> line, std::size_t i) {
     }
   }
   return true;
-}
-
-float highest(const float* values, std::size_t count) {
-  // Lanes without order between them, so that the compiler may take them side by side. Sides are even.
-  float lanes[2 * Fft2::kBlock] = {};
-  constexpr std::size_t kLanes = 2 * Fft2::kBlock;
-  std::size_t i = 0;
-  for (; i + kLanes <= count; i += kLanes) {
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      lanes[k] = values[i + k] > lanes[k] ? values[i + k] : lanes[k];
-    }
-  }
-  float result = 0.0F;
-  for (; i < count; ++i) {
-    result = std::max(result, values[i]);
-  }
-  for (const float lane : lanes) {
-    result = std::max(result, lane);
-  }
-  return result;
 }
 
 /// A shift in [-side, side] of a periodic picture, as the one nearest to none: [-side / 2, side / 2).
@@ -76,7 +57,8 @@ void Matcher::find_rotations() {
   const std::size_t side = config_.side;
   const Span<float> correlation = memory_.correlation;
   fft_.inverse_line(cross_spectrum().data(), correlation.data());
-  const float least = std::max(config_.peak_share * highest(correlation.data(), side), options_.min_rotation_peak);
+  const float least =
+      std::max(config_.peak_share * fft_.kernels().highest(correlation.data(), side), options_.min_rotation_peak);
   const std::size_t most =
       options_.max_peaks == 0 ? config_.max_peaks : std::min(options_.max_peaks, config_.max_peaks);
   const int radius = config_.com_radius;
@@ -110,40 +92,45 @@ void Matcher::transform_turned_rows(std::size_t first, std::size_t count) {
   for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
     const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
     for (std::size_t i = 0; i < rows; ++i) {
-      turned_row(image, turn_f, r + i, memory_.rows.data() + i * side);
+      turned_row(image, turn_f, r + i, fft_.kernels(), memory_.rows.data() + i * side);
     }
     fft_.forward_rows(memory_.rows.data(), r, rows, memory_.first);
   }
 }
 
-/// A few columns at a time through the fast memory: forward, whitened, multiplied with the filter of a, and back. The
-/// picture turned by a further 180 degrees has the conjugate spectrum (but for a shift, see locate_peak()), so both
-/// candidates come from one.
-void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
+/// The phases of the turned picture, in place.
+void Matcher::whiten_turned_columns(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
-  Complex* const turned = memory_.lines.data();
-  Complex* const straight = turned + kFftLanes * side;
-  Complex* const half_turned = straight + kFftLanes * side;
-  const float floor = b_.floor;
+  const Span<Complex> turned = memory_.first;
   for (std::size_t kx = first; kx < first + count; kx += kFftLanes) {
     const std::size_t columns = std::min(kFftLanes, first + count - kx);
-    Complex* const lines = memory_.first.data() + kx * side;
-    const Complex* const filter = a_.filter.data() + kx * side;
-    fft_.forward_lines(lines, columns, turned);
-    for (std::size_t i = 0; i < columns * side; ++i) {
-      const Complex z = turned[i];
-      const float weight = 1.0F / (std::sqrt(z.re * z.re + z.im * z.im) + floor);
-      const float re = weight * z.re;
-      const float im = weight * z.im;
-      const float rr = filter[i].re * re;
-      const float ii = filter[i].im * im;
-      const float ri = filter[i].re * im;
-      const float ir = filter[i].im * re;
-      straight[i] = {rr + ii, ir - ri};
-      half_turned[i] = {rr - ii, ir + ri};
+    fft_.forward_columns(turned, kx, columns);
+    fft_.kernels().whiten(turned.data() + kx * side, columns * side, b_.floor);
+  }
+}
+
+/// A few columns at a time through the fast memory: multiplied with the filter of a, and back. The picture turned by a
+/// further 180 degrees has the conjugate spectrum (but for a shift, see locate_peak()), so both candidates come from
+/// one.
+void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
+  const std::size_t side = config_.side;
+  const std::size_t last = side / 2;
+  const Complex* const turned = memory_.first.data();
+  const Complex* const filter = a_.filter.data();
+  Complex* const straight = memory_.lines.data();
+  Complex* const straight_last = straight + kFftLanes * side;
+  Complex* const half_turned = straight_last + side;
+  Complex* const half_turned_last = half_turned + kFftLanes * side;
+  const Kernels& kernels = fft_.kernels();
+  for (std::size_t kx = first; kx < first + count; kx += kFftLanes) {
+    const std::size_t columns = std::min(kFftLanes, first + count - kx);
+    const std::size_t at = kx * side;
+    kernels.cross(filter + at, turned + at, columns * side, straight, half_turned);
+    if (kx == 0) {
+      kernels.cross(filter + last * side, turned + last * side, side, straight_last, half_turned_last);
     }
-    fft_.inverse_lines(straight, columns, lines);
-    fft_.inverse_lines(half_turned, columns, memory_.second.data() + kx * side);
+    fft_.inverse_lines(straight, kx == 0 ? straight_last : nullptr, columns, memory_.first.data() + at);
+    fft_.inverse_lines(half_turned, kx == 0 ? half_turned_last : nullptr, columns, memory_.second.data() + at);
   }
 }
 
@@ -155,7 +142,7 @@ void Matcher::search_surface_rows(std::size_t first, std::size_t count) {
     fft_.inverse_rows(surface(), r, rows, memory_.rows.data());
     for (std::size_t i = 0; i < rows; ++i) {
       const float* const row = memory_.rows.data() + i * side;
-      const float top = highest(row, side);
+      const float top = fft_.kernels().highest(row, side);
       if (top > best_) {
         best_ = top;
         best_row_ = r + i;

@@ -13,8 +13,11 @@
 #include "mellin/core/span.hpp"
 #include "mellin/core/status.hpp"
 #include "mellin/spectral/fft_lanes.h"
+#include "mellin/spectral/vector_unit.hpp"
 
 namespace mellin {
+
+struct Kernels;
 
 struct Complex {
   float re = 0.0F;
@@ -89,22 +92,35 @@ class Fft2 {
     return m;
   }
 
+  /// A plan for kFftLanes lines and where they lie meanwhile.
+  struct LanePlan {
+    void* plan = nullptr;
+    Complex* in = nullptr;
+    Complex* out = nullptr;
+  };
+
   /// Plans for `side`. invalid_config: not is_fft_side(). insufficient_memory: `memory` was carved for another side.
-  Status init(std::uint16_t side, const Memory& memory);
+  /// The results do not depend on `unit`; the processor must have it.
+  Status init(std::uint16_t side, const Memory& memory, VectorUnit unit = best_vector_unit());
   std::uint16_t side() const { return side_; }
+
+  // Between the passes a spectrum holds row spectra. Their coefficients at kx = 0 and side / 2 are real: they lie
+  // together in column 0, as real and imaginary part, and are transformed together, as one column. Column side / 2 has
+  // no content then.
 
   /// Transforms `count` <= kBlock rows (contiguous, image rows from `first` on) into row spectra within `spectrum`.
   void forward_rows(const float* rows, std::size_t first, std::size_t count, Span<Complex> spectrum);
-  /// Finishes the columns kx in [first, first + count) of a spectrum whose rows are all there, in place.
+  /// Finishes the columns kx in [first, first + count) of a spectrum whose rows are all there, in place. Column side /
+  /// 2 is finished with column 0.
   void forward_columns(Span<Complex> spectrum, std::size_t first, std::size_t count);
-  /// Begins the way back with the columns kx in [first, first + count), in place.
+  /// Begins the way back with the columns kx in [first, first + count), in place; with column 0 goes column side / 2.
   void inverse_columns(Span<Complex> spectrum, std::size_t first, std::size_t count);
   /// Image rows [first, first + count), count <= kBlock, of a spectrum whose columns are all back; `rows` contiguous.
   void inverse_rows(Span<const Complex> spectrum, std::size_t first, std::size_t count, float* rows);
 
-  /// `count` <= kFftLanes columns, contiguous in `in` and `out`, which do not overlap.
-  void forward_lines(const Complex* in, std::size_t count, Complex* out);
-  void inverse_lines(const Complex* in, std::size_t count, Complex* out);
+  /// The way back of `count` <= kFftLanes columns, contiguous in `in` and `out`, which may be the same. The first is
+  /// column 0 where `last` is not null, which points to column side / 2 then. Changes `in`.
+  void inverse_lines(Complex* in, const Complex* last, std::size_t count, Complex* out);
   /// One line of `side` real numbers to its side / 2 + 1 coefficients, and back; no overlap.
   void forward_line(const float* in, Complex* out) const;
   void inverse_line(const Complex* in, float* out) const;
@@ -114,8 +130,14 @@ class Fft2 {
   /// The whole way back; destroys `spectrum`. invalid_argument: other sizes.
   Status inverse(Span<Complex> spectrum, Span<float> image);
 
+  /// The loops of the vector unit that this runs on.
+  const Kernels& kernels() const { return *kernels_; }
+
  private:
+  void transform_lines(Span<std::byte> plan, const Complex* in, std::size_t count, Complex* out);
+
   Memory memory_;
+  const Kernels* kernels_ = nullptr;
   std::uint16_t side_ = 0;
 };
 

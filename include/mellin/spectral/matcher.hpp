@@ -120,7 +120,7 @@ class Matcher {
     Span<Complex> first;       ///< a spectrum
     Span<Complex> second;      ///< a spectrum; scratch memory of extract()
     Span<float> rows;          ///< Fft2::kBlock rows of an image
-    Span<Complex> lines;       ///< three times kFftLanes columns of a spectrum
+    Span<Complex> lines;       ///< twice kFftLanes columns of a spectrum and one more
     Span<Complex> directions;  ///< cosine and sine of each angle
     Span<float> lowpass;       ///< along one axis
     Span<float> correlation;   ///< over the angles
@@ -139,7 +139,7 @@ class Matcher {
     m.first = work.template take<Complex>(spectrum_size(config.side), Part::spectral);
     m.second = work.template take<Complex>(spectrum_size(config.side), Part::spectral);
     m.rows = work.template take<float>(Fft2::kBlock * side, Part::spectral, Region::fast);
-    m.lines = work.template take<Complex>(3 * kFftLanes * side, Part::spectral, Region::fast);
+    m.lines = work.template take<Complex>(2 * (kFftLanes + 1) * side, Part::spectral, Region::fast);
     m.directions = tables.template take<Complex>(side, Part::spectral);
     m.lowpass = tables.template take<float>(side, Part::spectral, Region::fast);
     m.correlation = work.template take<float>(side, Part::spectral);
@@ -147,7 +147,8 @@ class Matcher {
   }
 
   /// Plans and tables. invalid_config: not is_valid(config). insufficient_memory: `memory` was carved for another side.
-  Status init(const MatcherConfig& config, const Memory& memory);
+  /// The results do not depend on `unit`; the processor must have it.
+  Status init(const MatcherConfig& config, const Memory& memory, VectorUnit unit = best_vector_unit());
   const MatcherConfig& config() const { return config_; }
 
   /// Starts making the features of `picture` (side * side bytes) in `out`; both must live until the job is done. An
@@ -159,7 +160,7 @@ class Matcher {
   Status begin_match(const Features& a, const Features& b, const MatchOptions& options = {});
 
   /// Does one pass, or lines_per_step lines of it, of the job. True when the job is done, or there is none.
-  /// Costliest pass: the columns of a turned picture, three FFTs a column.
+  /// Costliest pass: the filtered columns of a turned picture, two FFTs a column.
   bool step();
   /// How the last job ended, once step() has returned true. ok; degenerate: the picture of an extract() has no
   /// structure to match by (all free, all unknown, all one value), its features stay not ready.
@@ -186,6 +187,7 @@ class Matcher {
     find_rotations,
     turned_rows,
     turned_columns,
+    filter_columns,
     surface_rows,
     locate_peak
   };
@@ -210,6 +212,7 @@ class Matcher {
   void correlate_rings(std::size_t first, std::size_t count);
   void find_rotations();
   void transform_turned_rows(std::size_t first, std::size_t count);
+  void whiten_turned_columns(std::size_t first, std::size_t count);
   void filter_turned_columns(std::size_t first, std::size_t count);
   void search_surface_rows(std::size_t first, std::size_t count);
   void locate_peak();
