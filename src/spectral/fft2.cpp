@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <cstdint>
 
 #include "mellin/core/math.hpp"
 #include "spectral/kernels.hpp"
@@ -81,6 +82,20 @@ bool plan_complex_lanes(int n, bool inverse, Span<std::byte> memory) {
   return memory.data() != nullptr && mellin_lanes_fft_alloc(n, inverse ? 1 : 0, memory.data(), &bytes) != nullptr;
 }
 
+/// The part of `memory` that begins where an address of the form 32 n + `offset` is, or the like for narrower lanes.
+template <class T>
+Span<T> aligned(Span<T> memory, std::size_t offset) {
+  constexpr std::size_t kUnit = kFftLanes * sizeof(float);
+  const std::size_t beyond = (reinterpret_cast<std::uintptr_t>(memory.data()) + kUnit - offset) % kUnit;
+  const std::size_t skipped = beyond == 0 ? 0 : (kUnit - beyond) / sizeof(T);
+  return skipped < memory.size() ? memory.subspan(skipped, memory.size() - skipped) : Span<T>();
+}
+
+/// A plan's twiddle factors lie 264 bytes behind its start, or those and a multiple of 32 for real transforms.
+Span<std::byte> aligned_plan(Span<std::byte> memory) {
+  return aligned(memory, (kFftLanes * sizeof(float) - complex_plan_bytes(0) % (kFftLanes * sizeof(float))));
+}
+
 bool plan_real_lanes(int n, bool inverse, Span<std::byte> memory) {
   std::size_t bytes = memory.size();
   return memory.data() != nullptr && mellin_lanes_fftr_alloc(n, inverse ? 1 : 0, memory.data(), &bytes) != nullptr;
@@ -94,6 +109,17 @@ Status Fft2::init(std::uint16_t side, const Memory& memory, VectorUnit unit) {
   if (!is_fft_side(side)) {
     return Status::invalid_config;
   }
+  Memory lanes = memory;
+  lanes.in = aligned(memory.in, 0);
+  lanes.out = aligned(memory.out, 0);
+  lanes.rows_forward = aligned_plan(memory.rows_forward);
+  lanes.rows_inverse = aligned_plan(memory.rows_inverse);
+  lanes.columns_forward = aligned_plan(memory.columns_forward);
+  lanes.columns_inverse = aligned_plan(memory.columns_inverse);
+  return plan(side, lanes);
+}
+
+Status Fft2::plan(std::uint16_t side, const Memory& memory) {
   const bool enough =
       memory.in.size() >= kFftLanes * side && memory.out.size() >= kFftLanes * side &&
       plan_real(side, 0, memory.line_forward) && plan_real(side, 1, memory.line_inverse) &&

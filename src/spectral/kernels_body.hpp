@@ -109,7 +109,7 @@ inline void scatter(const float* vectors, std::size_t stride, std::size_t size, 
 // A line of complex numbers is a line of twice as many floats, and transposing {re, im, re, im} gives lane numbers.
 void lines(const Fft2::LanePlan& plan, const Complex* in, std::size_t side, std::size_t count, Complex* out) {
   gather(floats(in), 2 * side, 2 * side, count, floats(plan.in));
-  MELLIN_LANES(fft)(plan.plan, plan.in, plan.out);
+  MELLIN_LANES(fft)(plan.state, plan.in, plan.out);
   scatter(floats(plan.out), 2 * side, 2 * side, count, floats(out));
 }
 
@@ -153,7 +153,7 @@ inline void get_column(const Complex* from, std::size_t used, float* re, float* 
 void forward_rows(const Fft2::LanePlan& plan, const float* rows, std::size_t side, std::size_t count,
                   Complex* spectrum) {
   gather(rows, side, side, count, floats(plan.in));
-  MELLIN_LANES(fftr)(plan.plan, plan.in, plan.out);
+  MELLIN_LANES(fftr)(plan.state, plan.in, plan.out);
   const float* const from = floats(plan.out);
   // Both are real, and share a column.
   put_column(from, from + side * kLanes, count, spectrum);
@@ -171,7 +171,7 @@ void inverse_rows(const Fft2::LanePlan& plan, const Complex* spectrum, std::size
     float* const re = to + 2 * kx * kLanes;
     get_column(spectrum + kx * side, count, re, re + kLanes);
   }
-  MELLIN_LANES(fftri)(plan.plan, plan.in, plan.out);
+  MELLIN_LANES(fftri)(plan.state, plan.in, plan.out);
   scatter(floats(plan.out), side, side, count, rows);
 }
 

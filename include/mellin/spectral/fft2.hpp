@@ -55,6 +55,11 @@ constexpr std::size_t real_plan_bytes(std::size_t n, std::size_t lanes = 1) {
 }
 
 class Fft2 {
+  /// Lanes as wide as half a cache line are slower where they lie across two. The arena aligns to 8 bytes: so many more
+  /// are taken for each array of lanes, and init() aligns it.
+  static constexpr std::size_t kLaneBytes = kFftLanes * sizeof(float);
+  static constexpr std::size_t kSlack = kLaneBytes > kArenaAlignment ? kLaneBytes - kArenaAlignment : 0;
+
  public:
   /// Rows that are transformed together at most, so that the transposed spectrum is touched by whole cache lines.
   static constexpr std::size_t kBlock = 8;
@@ -77,9 +82,9 @@ class Fft2 {
   /// Plans from `tables`, where they stay; the lines under way from `work`, which is free between calls.
   template <class A, class W>
   static constexpr Memory carve(A& tables, W& work, std::uint16_t side) {
-    const std::size_t rows_bytes = kFftLanes > 1 ? real_plan_bytes(side, kFftLanes) : 0;
-    const std::size_t columns_bytes = complex_plan_bytes(side, kFftLanes);
-    const std::size_t block = kFftLanes > 1 ? kFftLanes * side : kBlock * (side / 2U + 1U);
+    const std::size_t rows_bytes = kFftLanes > 1 ? real_plan_bytes(side, kFftLanes) + kSlack : 0;
+    const std::size_t columns_bytes = complex_plan_bytes(side, kFftLanes) + kSlack;
+    const std::size_t block = kFftLanes > 1 ? kFftLanes * side + kSlack / sizeof(Complex) : kBlock * (side / 2U + 1U);
     Memory m;
     m.line_forward = tables.template take<std::byte>(real_plan_bytes(side), Part::spectral, Region::fast);
     m.line_inverse = tables.template take<std::byte>(real_plan_bytes(side), Part::spectral, Region::fast);
@@ -94,7 +99,7 @@ class Fft2 {
 
   /// A plan for kFftLanes lines and where they lie meanwhile.
   struct LanePlan {
-    void* plan = nullptr;
+    void* state = nullptr;
     Complex* in = nullptr;
     Complex* out = nullptr;
   };
@@ -134,6 +139,7 @@ class Fft2 {
   const Kernels& kernels() const { return *kernels_; }
 
  private:
+  Status plan(std::uint16_t side, const Memory& memory);
   void transform_lines(Span<std::byte> plan, const Complex* in, std::size_t count, Complex* out);
 
   Memory memory_;
