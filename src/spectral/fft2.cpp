@@ -9,6 +9,7 @@
 
 #include "mellin/core/math.hpp"
 #include "spectral/kernels.hpp"
+#include "spectral/peaks.hpp"
 
 static_assert(sizeof(mellin::Complex) == sizeof(kiss_fft_cpx), "KissFFT's complex number is two floats");
 
@@ -153,6 +154,26 @@ void Fft2::inverse_rows(Span<const Complex> spectrum, std::size_t first, std::si
   }
 }
 
+void Fft2::inverse_rows_search(Span<const Complex> spectrum, std::size_t first, std::size_t count, Peak& peak) {
+  assert(count <= kBlock && first + count <= side_ && spectrum.size() == spectrum_size(side_));
+  const LanePlan plan{memory_.rows_inverse.data(), memory_.in.data(), memory_.out.data()};
+  const float* const lanes = reinterpret_cast<const float*>(memory_.out.data());
+  for (std::size_t r = 0; r < count; r += kFftLanes) {
+    const std::size_t used = std::min(kFftLanes, count - r);
+    float maxima[kFftLanes] = {};
+    kernels_->inverse_rows_search(plan, spectrum.data() + first + r, side_, used, maxima);
+    for (std::size_t lane = 0; lane < used; ++lane) {
+      if (maxima[lane] > peak.value) {
+        std::size_t column = 0;
+        while (lanes[kFftLanes * column + lane] != maxima[lane]) {
+          ++column;
+        }
+        peak = {maxima[lane], first + r + lane, column};
+      }
+    }
+  }
+}
+
 #else
 
 namespace {
@@ -222,6 +243,17 @@ void Fft2::inverse_rows(Span<const Complex> spectrum, std::size_t first, std::si
   for (std::size_t r = 0; r < count; ++r) {
     block[r * width + last].re = block[r * width].im;
     inverse_line(block + r * width, rows + r * side_);
+  }
+}
+
+void Fft2::inverse_rows_search(Span<const Complex> spectrum, std::size_t first, std::size_t count, Peak& peak) {
+  float* const row = reinterpret_cast<float*>(memory_.out.data());
+  for (std::size_t r = first; r < first + count; ++r) {
+    inverse_rows(spectrum, r, 1, row);
+    const float top = highest(row, side_);
+    if (top > peak.value) {
+      peak = {top, r, static_cast<std::size_t>(std::find(row, row + side_, top) - row)};
+    }
   }
 }
 

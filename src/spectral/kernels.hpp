@@ -30,9 +30,10 @@ struct Kernels {
   /// … and back, as Fft2::inverse_rows() takes them.
   void (*inverse_rows)(const Fft2::LanePlan& plan, const Complex* spectrum, std::size_t side, std::size_t count,
                        float* rows);
+  /// The same, but leaves the rows in the lanes of plan.out, and each one's largest value, or 0, in `maxima`.
+  void (*inverse_rows_search)(const Fft2::LanePlan& plan, const Complex* spectrum, std::size_t side, std::size_t count,
+                              float* maxima);
 #endif
-  /// The largest of `count` values, or 0.
-  float (*highest)(const float* values, std::size_t count);
   /// z / (|z| + floor), in place.
   void (*whiten)(Complex* values, std::size_t count, float floor);
   /// straight = filter conj(w), half_turned = filter w. No overlap.

@@ -16,33 +16,68 @@ namespace {
 
 #if MELLIN_FFT_LANES > 1
 
-// A lane number is {re of all lanes, im of all lanes}; unused lanes are zero. Into the lanes and out of them four lines
-// at a time: squares of 4 x 4 are transposed.
+// A lane number is {re of all lanes, im of all lanes}; unused lanes are zero. Into the lanes and out of them go
+// squares, as many lines at a time as a register has elements.
 constexpr std::size_t kLanes = kFftLanes;
+#if defined(__AVX2__)
+constexpr std::size_t kGroup = 8;
+#else
 constexpr std::size_t kGroup = 4;
+#endif
+constexpr std::size_t kFour = 4;
 
-using Vector = float __attribute__((vector_size(16)));
+using Vector4 = float __attribute__((vector_size(16)));
+using Vector = float __attribute__((vector_size(4 * kGroup)));
 
-inline Vector load(const float* from) {
-  Vector v;
+template <class V>
+inline V load(const float* from) {
+  V v;
   __builtin_memcpy(&v, from, sizeof v);
   return v;
 }
-inline void store(Vector v, float* to) { __builtin_memcpy(to, &v, sizeof v); }
+template <class V>
+inline void store(V v, float* to) {
+  __builtin_memcpy(to, &v, sizeof v);
+}
 
 inline float* floats(Complex* z) { return reinterpret_cast<float*>(z); }
 inline const float* floats(const Complex* z) { return reinterpret_cast<const float*>(z); }
 
-inline void transpose(Vector& a, Vector& b, Vector& c, Vector& d) {
-  const Vector ab_low = __builtin_shufflevector(a, b, 0, 4, 1, 5);
-  const Vector ab_high = __builtin_shufflevector(a, b, 2, 6, 3, 7);
-  const Vector cd_low = __builtin_shufflevector(c, d, 0, 4, 1, 5);
-  const Vector cd_high = __builtin_shufflevector(c, d, 2, 6, 3, 7);
-  a = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
-  b = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
-  c = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
-  d = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
+#if defined(__AVX2__)
+
+inline void transpose(Vector (&rows)[kGroup]) {
+  Vector pairs[kGroup];
+  for (std::size_t i = 0; i < kGroup; i += 2) {
+    pairs[i] = __builtin_shufflevector(rows[i], rows[i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+    pairs[i + 1] = __builtin_shufflevector(rows[i], rows[i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+  }
+  Vector fours[kGroup];
+  for (std::size_t i = 0; i < kGroup; i += kFour) {
+    fours[i] = __builtin_shufflevector(pairs[i], pairs[i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+    fours[i + 1] = __builtin_shufflevector(pairs[i], pairs[i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
+    fours[i + 2] = __builtin_shufflevector(pairs[i + 1], pairs[i + 3], 0, 1, 8, 9, 4, 5, 12, 13);
+    fours[i + 3] = __builtin_shufflevector(pairs[i + 1], pairs[i + 3], 2, 3, 10, 11, 6, 7, 14, 15);
+  }
+  for (std::size_t i = 0; i < kFour; ++i) {
+    rows[i] = __builtin_shufflevector(fours[i], fours[i + kFour], 0, 1, 2, 3, 8, 9, 10, 11);
+    rows[i + kFour] = __builtin_shufflevector(fours[i], fours[i + kFour], 4, 5, 6, 7, 12, 13, 14, 15);
+  }
 }
+
+#else
+
+inline void transpose(Vector (&rows)[kGroup]) {
+  const Vector ab_low = __builtin_shufflevector(rows[0], rows[1], 0, 4, 1, 5);
+  const Vector ab_high = __builtin_shufflevector(rows[0], rows[1], 2, 6, 3, 7);
+  const Vector cd_low = __builtin_shufflevector(rows[2], rows[3], 0, 4, 1, 5);
+  const Vector cd_high = __builtin_shufflevector(rows[2], rows[3], 2, 6, 3, 7);
+  rows[0] = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
+  rows[1] = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
+  rows[2] = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
+  rows[3] = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
+}
+
+#endif
 
 /// `used` lines of `size` floats, `stride` apart, to `size` vectors of all lanes.
 inline void gather(const float* lines, std::size_t stride, std::size_t size, std::size_t used, float* vectors) {
@@ -51,16 +86,15 @@ inline void gather(const float* lines, std::size_t stride, std::size_t size, std
     const float* const from = lines + group * stride;
     float* const to = vectors + group;
     std::size_t i = 0;
-    for (; i + 4 <= size; i += 4) {
-      Vector a = load(from + i);
-      Vector b = load(from + stride + i);
-      Vector c = load(from + 2 * stride + i);
-      Vector d = load(from + 3 * stride + i);
-      transpose(a, b, c, d);
-      store(a, to + kLanes * i);
-      store(b, to + kLanes * (i + 1));
-      store(c, to + kLanes * (i + 2));
-      store(d, to + kLanes * (i + 3));
+    for (; i + kGroup <= size; i += kGroup) {
+      Vector square[kGroup];
+      for (std::size_t k = 0; k < kGroup; ++k) {
+        square[k] = load<Vector>(from + k * stride + i);
+      }
+      transpose(square);
+      for (std::size_t k = 0; k < kGroup; ++k) {
+        store(square[k], to + kLanes * (i + k));
+      }
     }
     for (; i < size; ++i) {
       for (std::size_t lane = 0; lane < kGroup; ++lane) {
@@ -82,16 +116,15 @@ inline void scatter(const float* vectors, std::size_t stride, std::size_t size, 
     const float* const from = vectors + group;
     float* const to = lines + group * stride;
     std::size_t i = 0;
-    for (; i + 4 <= size; i += 4) {
-      Vector a = load(from + kLanes * i);
-      Vector b = load(from + kLanes * (i + 1));
-      Vector c = load(from + kLanes * (i + 2));
-      Vector d = load(from + kLanes * (i + 3));
-      transpose(a, b, c, d);
-      store(a, to + i);
-      store(b, to + stride + i);
-      store(c, to + 2 * stride + i);
-      store(d, to + 3 * stride + i);
+    for (; i + kGroup <= size; i += kGroup) {
+      Vector square[kGroup];
+      for (std::size_t k = 0; k < kGroup; ++k) {
+        square[k] = load<Vector>(from + kLanes * (i + k));
+      }
+      transpose(square);
+      for (std::size_t k = 0; k < kGroup; ++k) {
+        store(square[k], to + k * stride + i);
+      }
     }
     for (; i < size; ++i) {
       for (std::size_t lane = 0; lane < kGroup; ++lane) {
@@ -113,23 +146,14 @@ void lines(const Fft2::LanePlan& plan, const Complex* in, std::size_t side, std:
   scatter(floats(plan.out), 2 * side, 2 * side, count, floats(out));
 }
 
-/// One coefficient of four rows, which lie side by side in a column of the spectrum.
-inline void put_four(Vector re, Vector im, Complex* to) {
-  store(__builtin_shufflevector(re, im, 0, 4, 1, 5), floats(to));
-  store(__builtin_shufflevector(re, im, 2, 6, 3, 7), floats(to) + 4);
-}
-inline void get_four(const Complex* from, Vector& re, Vector& im) {
-  const Vector low = load(floats(from));
-  const Vector high = load(floats(from) + 4);
-  re = __builtin_shufflevector(low, high, 0, 2, 4, 6);
-  im = __builtin_shufflevector(low, high, 1, 3, 5, 7);
-}
-
-/// From lane numbers at `re` and `im` to `used` elements of a column.
+/// From lane numbers at `re` and `im` to `used` elements of a column, where rows lie side by side, and back.
 inline void put_column(const float* re, const float* im, std::size_t used, Complex* to) {
   std::size_t lane = 0;
-  for (; lane + kGroup <= used; lane += kGroup) {
-    put_four(load(re + lane), load(im + lane), to + lane);
+  for (; lane + kFour <= used; lane += kFour) {
+    const auto four_re = load<Vector4>(re + lane);
+    const auto four_im = load<Vector4>(im + lane);
+    store<Vector4>(__builtin_shufflevector(four_re, four_im, 0, 4, 1, 5), floats(to + lane));
+    store<Vector4>(__builtin_shufflevector(four_re, four_im, 2, 6, 3, 7), floats(to + lane + 2));
   }
   for (; lane < used; ++lane) {
     to[lane] = {re[lane], im[lane]};
@@ -137,12 +161,23 @@ inline void put_column(const float* re, const float* im, std::size_t used, Compl
 }
 inline void get_column(const Complex* from, std::size_t used, float* re, float* im) {
   std::size_t lane = 0;
-  for (; lane + kGroup <= used; lane += kGroup) {
-    Vector four_re;
-    Vector four_im;
-    get_four(from + lane, four_re, four_im);
-    store(four_re, re + lane);
-    store(four_im, im + lane);
+#if defined(__AVX2__)
+  if (used == kLanes) {
+    const auto low = load<Vector>(floats(from));
+    const auto high = load<Vector>(floats(from + kFour));
+    const Vector first = __builtin_shufflevector(low, high, 0, 1, 2, 3, 8, 9, 10, 11);
+    const Vector second = __builtin_shufflevector(low, high, 4, 5, 6, 7, 12, 13, 14, 15);
+    // Elements 0 1 4 5 and 2 3 6 7 side by side, so that pairs are picked within the halves of the registers.
+    store<Vector>(__builtin_shufflevector(first, second, 0, 2, 8, 10, 4, 6, 12, 14), re);
+    store<Vector>(__builtin_shufflevector(first, second, 1, 3, 9, 11, 5, 7, 13, 15), im);
+    return;
+  }
+#endif
+  for (; lane + kFour <= used; lane += kFour) {
+    const auto low = load<Vector4>(floats(from + lane));
+    const auto high = load<Vector4>(floats(from + lane + 2));
+    store<Vector4>(__builtin_shufflevector(low, high, 0, 2, 4, 6), re + lane);
+    store<Vector4>(__builtin_shufflevector(low, high, 1, 3, 5, 7), im + lane);
   }
   for (; lane < kLanes; ++lane) {
     re[lane] = lane < used ? from[lane].re : 0.0F;
@@ -163,8 +198,9 @@ void forward_rows(const Fft2::LanePlan& plan, const float* rows, std::size_t sid
   }
 }
 
-void inverse_rows(const Fft2::LanePlan& plan, const Complex* spectrum, std::size_t side, std::size_t count,
-                  float* rows) {
+/// Into the lanes and back; the rows stay there.
+inline void inverse_rows_in_lanes(const Fft2::LanePlan& plan, const Complex* spectrum, std::size_t side,
+                                  std::size_t count) {
   float* const to = floats(plan.in);
   get_column(spectrum, count, to, to + side * kLanes);
   for (std::size_t kx = 1; kx < side / 2; ++kx) {
@@ -172,30 +208,31 @@ void inverse_rows(const Fft2::LanePlan& plan, const Complex* spectrum, std::size
     get_column(spectrum + kx * side, count, re, re + kLanes);
   }
   MELLIN_LANES(fftri)(plan.state, plan.in, plan.out);
+}
+
+void inverse_rows(const Fft2::LanePlan& plan, const Complex* spectrum, std::size_t side, std::size_t count,
+                  float* rows) {
+  inverse_rows_in_lanes(plan, spectrum, side, count);
   scatter(floats(plan.out), side, side, count, rows);
 }
 
-#endif
-
-float highest(const float* values, std::size_t count) {
-  // Maxima without order between them, so that the compiler may take them side by side.
-  constexpr std::size_t kSideBySide = 16;
-  float maxima[kSideBySide] = {};
-  std::size_t i = 0;
-  for (; i + kSideBySide <= count; i += kSideBySide) {
-    for (std::size_t k = 0; k < kSideBySide; ++k) {
-      maxima[k] = values[i + k] > maxima[k] ? values[i + k] : maxima[k];
+void inverse_rows_search(const Fft2::LanePlan& plan, const Complex* spectrum, std::size_t side, std::size_t count,
+                         float* maxima) {
+  inverse_rows_in_lanes(plan, spectrum, side, count);
+  const float* const rows = floats(plan.out);
+  float highest_of[kLanes] = {};
+  for (std::size_t i = 0; i < side; ++i) {
+    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+      const float value = rows[kLanes * i + lane];
+      highest_of[lane] = value > highest_of[lane] ? value : highest_of[lane];
     }
   }
-  float result = 0.0F;
-  for (; i < count; ++i) {
-    result = values[i] > result ? values[i] : result;
+  for (std::size_t lane = 0; lane < count; ++lane) {
+    maxima[lane] = highest_of[lane];
   }
-  for (const float maximum : maxima) {
-    result = maximum > result ? maximum : result;
-  }
-  return result;
 }
+
+#endif
 
 void whiten(Complex* values, std::size_t count, float floor) {
   for (std::size_t i = 0; i < count; ++i) {
@@ -245,8 +282,8 @@ void turned_run(const TurnedRun& from, std::size_t begin, std::size_t end, float
 
 const Kernels MELLIN_KERNELS = {
 #if MELLIN_FFT_LANES > 1
-    lines,   forward_rows, inverse_rows,
+    lines,  forward_rows, inverse_rows, inverse_rows_search,
 #endif
-    highest, whiten,       cross,        turned_run};
+    whiten, cross,        turned_run};
 
 }  // namespace mellin

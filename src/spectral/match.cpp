@@ -77,25 +77,14 @@ void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
 
 /// The correlation surface is looked at as it comes, a block of rows at a time, and never stored.
 void Matcher::search_surface_rows(std::size_t first, std::size_t count) {
-  const std::size_t side = config_.side;
   for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
-    const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
-    fft_.inverse_rows(surface(), r, rows, memory_.rows.data());
-    for (std::size_t i = 0; i < rows; ++i) {
-      const float* const row = memory_.rows.data() + i * side;
-      const float top = fft_.kernels().highest(row, side);
-      if (top > best_) {
-        best_ = top;
-        best_row_ = r + i;
-        best_column_ = static_cast<std::size_t>(std::find(row, row + side, top) - row);
-      }
-    }
+    fft_.inverse_rows_search(surface(), r, std::min(Fft2::kBlock, first + count - r), peak_);
   }
 }
 
 /// Centre of mass round the highest value (Eq. 3) and the pose that it means.
 void Matcher::locate_peak() {
-  if (!(best_ > 0.0F)) {
+  if (!(peak_.value > 0.0F)) {
     return;
   }
   const std::size_t side = config_.side;
@@ -105,9 +94,9 @@ void Matcher::locate_peak() {
   float moment_y = 0.0F;
   for (int dy = -radius; dy <= radius; ++dy) {
     float* const row = memory_.rows.data();
-    fft_.inverse_rows(surface(), cyclic(best_row_, dy, side), 1, row);
+    fft_.inverse_rows(surface(), cyclic(peak_.row, dy, side), 1, row);
     for (int dx = -radius; dx <= radius; ++dx) {
-      const float value = std::max(row[cyclic(best_column_, dx, side)], 0.0F);
+      const float value = std::max(row[cyclic(peak_.column, dx, side)], 0.0F);
       mass += value;
       moment_x += value * static_cast<float>(dx);
       moment_y += value * static_cast<float>(dy);
@@ -116,14 +105,14 @@ void Matcher::locate_peak() {
   // Turning pixel centres 0 … side - 1 by 180 degrees about their middle maps i to side - 1 - i, whereas the conjugate
   // spectrum stands for -i: a shift of side - 1 is to be taken off.
   const double mirrored = half_turn_ ? static_cast<double>(side - 1) : 0.0;
-  const double x = static_cast<double>(best_column_) + static_cast<double>(moment_x / mass) - mirrored;
-  const double y = static_cast<double>(best_row_) + static_cast<double>(moment_y / mass) - mirrored;
+  const double x = static_cast<double>(peak_.column) + static_cast<double>(moment_x / mass) - mirrored;
+  const double y = static_cast<double>(peak_.row) + static_cast<double>(moment_y / mass) - mirrored;
   const auto pixel_m = static_cast<double>(config_.pixel_m);
   const RotationPeak& rotation = rotation_.peaks()[rotation_index_];
   Hypothesis hypothesis;
   hypothesis.a_T_b = {nearest_shift(x, side) * pixel_m, nearest_shift(y, side) * pixel_m,
                       wrap_angle(rotation.angle_rad + (half_turn_ ? kPi : 0.0))};
-  hypothesis.peak = best_;
+  hypothesis.peak = peak_.value;
   hypothesis.rotation_peak = rotation.strength;
   add_hypothesis(hypothesis);
 }

@@ -208,14 +208,14 @@ Matcher::Stage Matcher::after(Stage stage) {
       return Stage::filter_columns;
     case Stage::filter_columns:
       half_turn_ = false;
-      best_ = 0.0F;
+      peak_ = {};
       return Stage::surface_rows;
     case Stage::surface_rows:
       return Stage::locate_peak;
     case Stage::locate_peak:
       if (!half_turn_) {
         half_turn_ = true;
-        best_ = 0.0F;
+        peak_ = {};
         return Stage::surface_rows;
       }
       return ++rotation_index_ == rotation_count() ? Stage::idle : Stage::turned_rows;

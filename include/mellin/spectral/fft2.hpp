@@ -123,6 +123,16 @@ class Fft2 {
   /// Image rows [first, first + count), count <= kBlock, of a spectrum whose columns are all back; `rows` contiguous.
   void inverse_rows(Span<const Complex> spectrum, std::size_t first, std::size_t count, float* rows);
 
+  /// The highest pixel that inverse_rows_search() has come by.
+  struct Peak {
+    float value = 0.0F;
+    std::size_t row = 0;
+    std::size_t column = 0;  ///< the first of equal ones
+  };
+  /// Instead of inverse_rows() where the rows themselves are not wanted: moves `peak` to the highest pixel of these
+  /// rows if that is higher.
+  void inverse_rows_search(Span<const Complex> spectrum, std::size_t first, std::size_t count, Peak& peak);
+
   /// The way back of `count` <= kFftLanes columns, contiguous in `in` and `out`, which may be the same. The first is
   /// column 0 where `last` is not null, which points to column side / 2 then. Changes `in`.
   void inverse_lines(Complex* in, const Complex* last, std::size_t count, Complex* out);

@@ -166,9 +166,7 @@ class Matcher {
   RotationEstimator rotation_;
   std::size_t rotation_index_ = 0;  // of its peaks, the one under way
   bool half_turn_ = false;          // looking at beta + 180 degrees
-  float best_ = 0.0F;               // highest value of the correlation surface so far, and where
-  std::size_t best_row_ = 0;
-  std::size_t best_column_ = 0;
+  Fft2::Peak peak_;                 // of the correlation surface so far
   HypothesisList hypotheses_;
 };
 
