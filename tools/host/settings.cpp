@@ -82,6 +82,8 @@ void visit_settings(C& c, Visit&& visit) {
   visit("submaps.band_rows", c.submaps.band_rows);
   visit("screening.peak_share", c.screening.matcher.peak_share);
   visit("screening.max_peaks", c.screening.matcher.max_peaks);
+  visit("screening.turns_per_bin", c.screening.matcher.turns_per_bin);
+  visit("screening.kept_turns", c.screening.matcher.kept_turns);
   visit("screening.verified", c.screening.verified);
   visit("screening.cache_features", c.screening.cache_features);
   visit("screening.hold_digests", c.screening.hold_digests);
