@@ -91,6 +91,7 @@ Status SpectralScreening::begin_describe(std::uint32_t index, const GridView& gr
   }
   a_ = index;
   featured_b_ = kNone;
+  kept_b_ = kNone;
   classified_b_ = kNone;
   described_ = index;
   restored_ = kNone;
@@ -104,8 +105,9 @@ Status SpectralScreening::begin_restore(std::uint32_t index, Span<const std::uin
   if (index >= config_.max_submaps || digest.size() != digest_size(config_.matcher.side)) {
     return Status::invalid_argument;
   }
-  if (index == classified_b_ || index == featured_b_) {
+  if (index == classified_b_ || index == featured_b_ || index == kept_b_) {
     featured_b_ = kNone;
+    kept_b_ = kNone;
     classified_b_ = kNone;
   }
   restored_ = index;
@@ -139,6 +141,10 @@ void SpectralScreening::begin_match() {
   const bool cached = config_.cache_features;
   const Features fa = cached ? cached_features(a_) : features_a_;
   const Features fb = cached ? cached_features(b_) : features_b_;
+  if (kept_b_ != b_) {
+    matcher_.keep_turned(fb);
+    kept_b_ = b_;
+  }
   stage_ = matcher_.begin_match(fa, fb) == Status::ok ? Stage::match : Stage::idle;
 }
 

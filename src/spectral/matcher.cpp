@@ -26,7 +26,7 @@ bool fits(const Features& features, const MatcherConfig& config) {
 
 }  // namespace
 
-Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
+Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUnit unit) {
   stage_ = Stage::idle;
   if (!is_valid(config)) {
     return Status::invalid_config;
@@ -34,11 +34,12 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
   const std::size_t side = config.side;
   const bool enough = memory.first.size() == spectrum_size(config.side) &&
                       memory.second.size() == memory.first.size() && memory.rows.size() == Fft2::kBlock * side &&
-                      memory.lines.size() == 3 * kFftLanes * side && memory.lowpass.size() == side;
+                      memory.lines.size() == 2 * (kFftLanes + 1) * side && memory.lowpass.size() == side &&
+                      memory.turns.size() == config.kept_turns * spectrum_size(config.side);
   if (!enough) {
     return Status::insufficient_memory;
   }
-  const Status planned = fft_.init(config.side, memory.fft);
+  const Status planned = fft_.init(config.side, memory.fft, unit);
   if (planned != Status::ok) {
     return planned;
   }
@@ -50,6 +51,7 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
   }
   config_ = config;
   memory_ = memory;
+  query_ = nullptr;
   margin_ = EdgeBlur::margin(config.side, config.edge_margin);
   fill_lowpass(config.lowpass_sigma, memory.lowpass);
   weigh_filter();
@@ -83,6 +85,9 @@ Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out) {
   assert(valid);
   stage_ = Stage::idle;
   out.ready = false;
+  if (out.image.data() == query_) {
+    query_ = nullptr;
+  }
   if (!valid) {
     return status_ = Status::invalid_argument;
   }
@@ -116,6 +121,13 @@ Status Matcher::begin_match(const Features& a, const Features& b, const MatchOpt
   stage_ = Stage::estimate_rotation;
   line_ = 0;
   return Status::ok;
+}
+
+void Matcher::keep_turned(const Features& b) {
+  stage_ = Stage::idle;
+  query_ = memory_.turns.empty() ? nullptr : b.image.data();
+  turns_ = 0;
+  std::fill(memory_.turn_place.begin(), memory_.turn_place.end(), std::uint16_t{0});
 }
 
 bool Matcher::step() {
@@ -154,6 +166,8 @@ std::size_t Matcher::lines_of(Stage stage) const {
     case Stage::whiten:
     case Stage::turned_columns:
       return side / 2 + 1;
+    case Stage::filter_columns:
+      return side / 2;
     case Stage::describe_rotation:
     case Stage::estimate_rotation:
     case Stage::locate_peak:
@@ -178,6 +192,8 @@ void Matcher::run(Stage stage, std::size_t first, std::size_t count) {
     case Stage::turned_rows:
       return transform_turned_rows(first, count);
     case Stage::turned_columns:
+      return whiten_turned_columns(first, count);
+    case Stage::filter_columns:
       return filter_turned_columns(first, count);
     case Stage::surface_rows:
       return search_surface_rows(first, count);
@@ -215,22 +231,25 @@ Matcher::Stage Matcher::after(Stage stage) {
       return Stage::idle;
     case Stage::estimate_rotation:
       rotation_index_ = 0;
-      return rotation_count() == 0 ? Stage::idle : Stage::turned_rows;
+      return rotation_count() == 0 ? Stage::idle : begin_rotation();
     case Stage::turned_rows:
       return Stage::turned_columns;
     case Stage::turned_columns:
+      keep_turn();
+      return Stage::filter_columns;
+    case Stage::filter_columns:
       half_turn_ = false;
-      best_ = 0.0F;
+      peak_ = {};
       return Stage::surface_rows;
     case Stage::surface_rows:
       return Stage::locate_peak;
     case Stage::locate_peak:
       if (!half_turn_) {
         half_turn_ = true;
-        best_ = 0.0F;
+        peak_ = {};
         return Stage::surface_rows;
       }
-      return ++rotation_index_ == rotation_count() ? Stage::idle : Stage::turned_rows;
+      return ++rotation_index_ == rotation_count() ? Stage::idle : begin_rotation();
     case Stage::idle:
       break;
   }

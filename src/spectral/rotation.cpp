@@ -295,8 +295,17 @@ void RotationEstimator::correlate_polar(std::size_t first, std::size_t count) {
 
 void RotationEstimator::correlate_scales(Fft2& fft, std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
-  for (std::size_t i = first * side; i < (first + count) * side; ++i) {
-    scratch_.surface[i] = cross(a_[i], b_[i]);
+  const std::size_t last = side / 2;
+  const auto cross_column = [&](std::size_t kx) {
+    for (std::size_t i = kx * side; i < (kx + 1) * side; ++i) {
+      scratch_.surface[i] = cross(a_[i], b_[i]);
+    }
+  };
+  for (std::size_t kx = first; kx < std::min(first + count, last); ++kx) {
+    cross_column(kx);
+  }
+  if (first == 0) {
+    cross_column(last);  // goes back with column 0
   }
   fft.inverse_columns(scratch_.surface, first, count);
 }

@@ -19,12 +19,12 @@ using Picture = std::vector<std::uint8_t>;
 /// A matcher with memory for itself and as many features as are asked for.
 class Bench {
  public:
-  explicit Bench(const MatcherConfig& config) : config_(config) {
+  explicit Bench(const MatcherConfig& config, VectorUnit unit = best_vector_unit()) : config_(config) {
     MeasureArena measure;
     Matcher::carve(measure, config);
     memory_.resize(measure.use().total() / sizeof(double));
     Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(memory_.data()), measure.use().total()));
-    REQUIRE(matcher.init(config, Matcher::carve(arena, config)) == Status::ok);
+    REQUIRE(matcher.init(config, Matcher::carve(arena, config), unit) == Status::ok);
     REQUIRE(arena.ok());
     REQUIRE(arena.use().total() == measure.use().total());
   }

@@ -96,6 +96,8 @@ void visit_settings(C& c, Visit&& visit) {
   visit("submaps.min_scans", c.submaps.min_scans);
   visit("submaps.band_rows", c.submaps.band_rows);
   visit_matcher("screening.", c.screening.matcher, visit);
+  visit("screening.turns_per_bin", c.screening.matcher.turns_per_bin);
+  visit("screening.kept_turns", c.screening.matcher.kept_turns);
   visit("screening.verified", c.screening.verified);
   visit("screening.cache_features", c.screening.cache_features);
   visit("screening.hold_digests", c.screening.hold_digests);

@@ -119,6 +119,7 @@ class SpectralScreening final : public DigestMatcher {
   std::uint32_t described_ = kNone;     ///< whose digest is held in the second place, unless all are …
   std::uint32_t restored_ = kNone;      ///< … and in the first
   std::uint32_t featured_b_ = kNone;    ///< whose features features_b_ holds
+  std::uint32_t kept_b_ = kNone;        ///< whose turned spectra the matcher keeps
   std::uint32_t classified_b_ = kNone;  ///< whose classes classes_b holds
   Features features_a_;                 ///< while they are cached, those under way
   Features features_b_;
