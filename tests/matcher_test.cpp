@@ -373,6 +373,12 @@ TEST_SUITE("matcher") {
                                    with([](auto& c) { c.lowpass_sigma = -1.0F; }),
                                    with([](auto& c) { c.whitening_floor = 0.0F; }),
                                    with([](auto& c) { c.edge_margin = NAN; }),
+                                   with([](auto& c) { c.rotation = static_cast<RotationMode>(4); }),
+                                   with([](auto& c) { c.high_pass = static_cast<HighPass>(3); }),
+                                   with([](auto& c) { c.peak_fit = static_cast<PeakFit>(2); }),
+                                   with([](auto& c) { c.preprocessing = static_cast<Preprocessing>(3); }),
+                                   with([](auto& c) { c.min_peak = -0.1F; }),
+                                   with([](auto& c) { c.min_overlap = 0.0F; }),
                                    with([](auto& c) { c.turns_per_bin = 9; }),
                                    with([](auto& c) { c.kept_turns = 1; }),
                                    with([](auto& c) {

@@ -132,6 +132,7 @@ TEST_CASE("validate() refuses each field out of its range and names it") {
       {"lowpass_sigma", [](Config& c) { c.screening.matcher.lowpass_sigma = kNaN; }},
       {"whitening_floor", [](Config& c) { c.registration.matcher.whitening_floor = 0.0F; }},
       {"edge_margin", [](Config& c) { c.screening.matcher.edge_margin = 0.2F; }},
+      {"min_overlap", [](Config& c) { c.screening.matcher.min_overlap = 0.0F; }},
       {"preprocessing", [](Config& c) { c.screening.matcher.preprocessing = static_cast<Preprocessing>(3); }},
       {"rotation", [](Config& c) { c.registration.matcher.rotation = static_cast<RotationMode>(4); }},
       {"high_pass", [](Config& c) { c.screening.matcher.high_pass = static_cast<HighPass>(3); }},

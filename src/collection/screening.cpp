@@ -63,11 +63,12 @@ Span<const std::uint8_t> SpectralScreening::digest_bytes(std::uint32_t index) co
 }
 
 Features SpectralScreening::cached_features(std::uint32_t index) const {
-  const std::uint16_t side = config_.matcher.side;
   const std::size_t slot = index;
   Features f;
-  f.image = memory_.images.subspan(slot * Features::image_count(side), Features::image_count(side));
-  f.filter = memory_.filters.subspan(slot * Features::filter_count(side), Features::filter_count(side));
+  f.image =
+      memory_.images.subspan(slot * Features::image_count(config_.matcher), Features::image_count(config_.matcher));
+  f.filter =
+      memory_.filters.subspan(slot * Features::filter_count(config_.matcher), Features::filter_count(config_.matcher));
   const std::size_t polar = Features::polar_count(config_.matcher);
   f.polar = memory_.polar.subspan(slot * polar, polar);
   f.floor = memory_.floors[slot];
@@ -76,7 +77,9 @@ Features SpectralScreening::cached_features(std::uint32_t index) const {
 }
 
 void SpectralScreening::begin_features(std::uint32_t index, Features& out, Stage stage) {
-  stage_ = matcher_.begin_extract(digest_out(index).obstacles, out) == Status::ok ? stage : Stage::idle;
+  stage_ = matcher_.begin_extract(digest_out(index).obstacles, out, digest_out(index).observed) == Status::ok
+               ? stage
+               : Stage::idle;
 }
 
 void SpectralScreening::begin_caching(std::uint32_t index) {

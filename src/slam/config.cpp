@@ -132,6 +132,7 @@ Status validate_matcher(const MatcherConfig& m, const Log& log) {
       {"lowpass_sigma", m.lowpass_sigma, 0.0F, kMuch, true, "0 to 999"},
       {"whitening_floor", m.whitening_floor, 0.0F, 1.0F, false, "over 0, at most 1"},
       {"edge_margin", m.edge_margin, 0.0F, 0.1F, false, "over 0, at most 0.1"},
+      {"min_overlap", m.min_overlap, 0.0F, 1.0F, false, "over 0, at most 1"},
       {"preprocessing", number(m.preprocessing), 0.0F, number(Preprocessing::blur), true, "a Preprocessing"},
       {"rotation", number(m.rotation), 0.0F, number(RotationMode::log_polar_scale), true, "a RotationMode"},
       {"high_pass", number(m.high_pass), 0.0F, number(HighPass::reddy), true, "a HighPass"},

@@ -14,10 +14,9 @@ float magnitude(Complex z) { return std::sqrt(z.re * z.re + z.im * z.im); }
 
 /// The seamless picture lies in the features, or, where they keep none, in scratch memory until it is transformed.
 ImageView Matcher::picture_image() const {
-  if (!out_->image.empty()) {
-    return {out_->image, config_.side};
-  }
-  return {as_floats(memory_.second).first(Features::image_count(config_.side)), config_.side};
+  const std::size_t pixels = std::size_t{config_.side} * config_.side;
+  const Span<float> memory = out_->image.empty() ? as_floats(memory_.second) : out_->image;
+  return {memory.first(pixels), config_.side};
 }
 
 void Matcher::load_rows(std::size_t first, std::size_t count) {

@@ -19,8 +19,8 @@ void fill_lowpass(float sigma, Span<float> lowpass) {
 }
 
 bool fits(const Features& features, const MatcherConfig& config) {
-  return (features.image.empty() || features.image.size() == Features::image_count(config.side)) &&
-         (features.filter.empty() || features.filter.size() == Features::filter_count(config.side)) &&
+  return (features.image.empty() || features.image.size() == Features::image_count(config)) &&
+         (features.filter.empty() || features.filter.size() == Features::filter_count(config)) &&
          features.polar.size() == Features::polar_count(config);
 }
 
@@ -35,6 +35,7 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUn
   const bool enough = memory.first.size() == spectrum_size(config.side) &&
                       memory.second.size() == memory.first.size() && memory.rows.size() == Fft2::kBlock * side &&
                       memory.lines.size() == 2 * (kFftLanes + 1) * side && memory.lowpass.size() == side &&
+                      memory.masked.size() == (config.masked ? 7 * spectrum_size(config.side) : 0) &&
                       memory.turns.size() == config.kept_turns * spectrum_size(config.side);
   if (!enough) {
     return Status::insufficient_memory;
@@ -80,8 +81,9 @@ void Matcher::weigh_filter() {
   gradient_noise_ = std::max(1.0, lines) * slope_sum * square_sum / (sum * sum * sum * sum);
 }
 
-Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out) {
-  const bool valid = fft_.side() > 0 && picture.size() == Features::image_count(config_.side) && fits(out, config_);
+Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out, Span<const std::uint8_t> observed) {
+  const bool valid = fft_.side() > 0 && picture.size() == std::size_t{config_.side} * config_.side &&
+                     fits(out, config_) && (observed.empty() || observed.size() == mask_bytes(config_.side));
   assert(valid);
   stage_ = Stage::idle;
   out.ready = false;
@@ -92,6 +94,7 @@ Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out) {
     return status_ = Status::invalid_argument;
   }
   picture_ = picture;
+  observed_ = observed;
   out_ = &out;
   lowest_ = 255;
   highest_ = 0;
@@ -157,12 +160,18 @@ std::size_t Matcher::lines_of(Stage stage) const {
   switch (stage) {
     case Stage::load:
     case Stage::picture_rows:
+    case Stage::masked_rows:
+    case Stage::masked_turned_rows:
+    case Stage::masked_search:
     case Stage::turned_rows:
     case Stage::surface_rows:
       return side;
     case Stage::blur_edges:
       return EdgeBlur::lines(config_.side, margin_);
     case Stage::picture_columns:
+    case Stage::masked_columns:
+    case Stage::masked_turned_columns:
+    case Stage::masked_correlation:
     case Stage::whiten:
     case Stage::turned_columns:
       return side / 2 + 1;
@@ -187,6 +196,18 @@ void Matcher::run(Stage stage, std::size_t first, std::size_t count) {
       return transform_picture_rows(first, count);
     case Stage::picture_columns:
       return transform_picture_columns(first, count);
+    case Stage::masked_rows:
+      return transform_masked_rows(first, count);
+    case Stage::masked_columns:
+      return transform_masked_columns(first, count);
+    case Stage::masked_turned_rows:
+      return transform_masked_turned_rows(first, count);
+    case Stage::masked_turned_columns:
+      return transform_masked_turned_columns(first, count);
+    case Stage::masked_correlation:
+      return correlate_masked_columns(first, count);
+    case Stage::masked_search:
+      return search_masked_rows(first, count);
     case Stage::whiten:
       return whiten_columns(first, count);
     case Stage::turned_rows:
@@ -218,11 +239,15 @@ Matcher::Stage Matcher::after(Stage stage) {
     case Stage::blur_edges:
       return Stage::picture_rows;
     case Stage::picture_rows:
+      return config_.masked ? Stage::masked_rows : Stage::picture_columns;
+    case Stage::masked_rows:
+      return out_->filter.empty() ? Stage::picture_columns : Stage::masked_columns;
+    case Stage::masked_columns:
       return Stage::picture_columns;
     case Stage::picture_columns:
       end_magnitudes();
       rotation_.begin_describe(out_->polar);
-      return out_->filter.empty() ? Stage::describe_rotation : Stage::whiten;
+      return out_->filter.empty() || config_.masked ? Stage::describe_rotation : Stage::whiten;
     case Stage::whiten:
       return Stage::describe_rotation;
     case Stage::describe_rotation:
@@ -237,17 +262,23 @@ Matcher::Stage Matcher::after(Stage stage) {
     case Stage::turned_columns:
       keep_turn();
       return Stage::filter_columns;
+    case Stage::masked_turned_rows:
+      return Stage::masked_turned_columns;
     case Stage::filter_columns:
+    case Stage::masked_turned_columns:
       half_turn_ = false;
       peak_ = {};
-      return Stage::surface_rows;
+      return config_.masked ? Stage::masked_correlation : Stage::surface_rows;
+    case Stage::masked_correlation:
+      return Stage::masked_search;
     case Stage::surface_rows:
+    case Stage::masked_search:
       return Stage::locate_peak;
     case Stage::locate_peak:
       if (!half_turn_) {
         half_turn_ = true;
         peak_ = {};
-        return Stage::surface_rows;
+        return config_.masked ? Stage::masked_correlation : Stage::surface_rows;
       }
       return ++rotation_index_ == rotation_count() ? Stage::idle : begin_rotation();
     case Stage::idle:
@@ -256,8 +287,8 @@ Matcher::Stage Matcher::after(Stage stage) {
   return Stage::idle;
 }
 
-Status Matcher::extract(Span<const std::uint8_t> picture, Features& out) {
-  const Status begun = begin_extract(picture, out);
+Status Matcher::extract(Span<const std::uint8_t> picture, Features& out, Span<const std::uint8_t> observed) {
+  const Status begun = begin_extract(picture, out, observed);
   while (!step()) {
   }
   return begun == Status::ok ? status_ : begun;

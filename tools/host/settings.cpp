@@ -23,6 +23,8 @@ void visit_matcher(const std::string& prefix, C& c, Visit& visit) {
   visit((prefix + "max_peaks").c_str(), c.max_peaks);
   visit((prefix + "min_peak").c_str(), c.min_peak);
   visit((prefix + "lowpass_sigma").c_str(), c.lowpass_sigma);
+  visit((prefix + "masked").c_str(), c.masked);
+  visit((prefix + "min_overlap").c_str(), c.min_overlap);
 }
 
 /// Calls visit(name, field) for each setting. Fields that resolved() overwrites are not among them.

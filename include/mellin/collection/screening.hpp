@@ -64,8 +64,8 @@ class SpectralScreening final : public DigestMatcher {
     }
     if (config.cache_features) {
       const std::size_t slots = config.max_submaps;
-      m.images = kept.template take<float>(slots * Features::image_count(side), Part::digests);
-      m.filters = kept.template take<Complex>(slots * Features::filter_count(side), Part::digests);
+      m.images = kept.template take<float>(slots * Features::image_count(config.matcher), Part::digests);
+      m.filters = kept.template take<Complex>(slots * Features::filter_count(config.matcher), Part::digests);
       m.polar = kept.template take<Complex>(slots * Features::polar_count(config.matcher), Part::digests);
       m.floors = kept.template take<float>(slots, Part::digests);
       m.ready = kept.template take<std::uint8_t>(slots, Part::digests);

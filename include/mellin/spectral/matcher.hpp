@@ -15,6 +15,7 @@
 
 #include "mellin/core/arena.hpp"
 #include "mellin/core/containers.hpp"
+#include "mellin/core/math.hpp"
 #include "mellin/core/se2.hpp"
 #include "mellin/core/span.hpp"
 #include "mellin/core/status.hpp"
@@ -53,6 +54,9 @@ struct MatchOptions {
   float min_rotation_peak = -1.0F;  ///< no translation is sought at rotations whose coefficient is lower
 };
 
+struct Curvature;
+struct PeakSpread;
+
 class Matcher {
  public:
   struct Memory {
@@ -62,6 +66,7 @@ class Matcher {
     Span<float> rows;      ///< Fft2::kBlock rows of an image
     Span<Complex> lines;   ///< twice kFftLanes columns of a spectrum and one more
     Span<float> lowpass;   ///< along one axis
+    Span<Complex> masked;  ///< seven spectra, for MatcherConfig::masked
     RotationEstimator::Memory rotation;
     Span<Complex> turns;             ///< spectra of the query, turned and whitened, MatcherConfig::kept_turns of them
     Span<std::uint16_t> turn_place;  ///< of each angle: where in `turns`, from 1 on; 0: not there
@@ -82,6 +87,7 @@ class Matcher {
     m.rows = work.template take<float>(Fft2::kBlock * side, Part::spectral, Region::fast);
     m.lines = work.template take<Complex>(2 * (kFftLanes + 1) * side, Part::spectral, Region::fast);
     m.lowpass = tables.template take<float>(side, Part::spectral, Region::fast);
+    m.masked = work.template take<Complex>(config.masked ? 7 * spectrum_size(config.side) : 0, Part::spectral);
     m.rotation = RotationEstimator::carve(tables, work, config);
     m.turns = work.template take<Complex>(config.kept_turns * spectrum_size(config.side), Part::spectral);
     m.turn_place =
@@ -95,8 +101,9 @@ class Matcher {
   const MatcherConfig& config() const { return config_; }
 
   /// Starts making the features of `picture` (side * side bytes) in `out`; both must live until the job is done. An
-  /// unfinished earlier job is given up. invalid_argument: sizes do not hold.
-  Status begin_extract(Span<const std::uint8_t> picture, Features& out);
+  /// unfinished earlier job is given up. `observed`: a mask of bits as a digest has it, for MatcherConfig::masked, must
+  /// live, too; empty: all of it. invalid_argument: sizes do not hold.
+  Status begin_extract(Span<const std::uint8_t> picture, Features& out, Span<const std::uint8_t> observed = {});
   /// Starts matching; the memory of both must live and stay until the job is done, and they may be the same. An
   /// unfinished earlier job is given up. invalid_argument: sizes do not hold, or a has no filter, or b no image.
   /// degenerate: one of them is not ready; there are no hypotheses then.
@@ -116,7 +123,7 @@ class Matcher {
   const HypothesisList& hypotheses() const { return hypotheses_; }
 
   /// begin_extract() and all its steps. Status of both.
-  Status extract(Span<const std::uint8_t> picture, Features& out);
+  Status extract(Span<const std::uint8_t> picture, Features& out, Span<const std::uint8_t> observed = {});
   /// begin_match() and all its steps. Status of both; see hypotheses().
   Status match(const Features& a, const Features& b, const MatchOptions& options = {});
 
@@ -126,10 +133,16 @@ class Matcher {
     load,
     blur_edges,
     picture_rows,
+    masked_rows,
+    masked_columns,
     picture_columns,
     whiten,
     describe_rotation,
     estimate_rotation,
+    masked_turned_rows,
+    masked_turned_columns,
+    masked_correlation,
+    masked_search,
     turned_rows,
     turned_columns,
     filter_columns,
@@ -161,7 +174,21 @@ class Matcher {
   void transform_turned_rows(std::size_t first, std::size_t count);
   void whiten_turned_columns(std::size_t first, std::size_t count);
   void filter_turned_columns(std::size_t first, std::size_t count);
+  SinCosF turn_under_way() const;
+  void transform_masked_row(const float* picture, const float* mask, std::size_t row,
+                            const Span<Complex> (&spectra)[3]);
+  void transform_masked_rows(std::size_t first, std::size_t count);
+  void transform_masked_columns(std::size_t first, std::size_t count);
+  void transform_masked_turned_rows(std::size_t first, std::size_t count);
+  void transform_masked_turned_columns(std::size_t first, std::size_t count);
+  void correlate_masked_columns(std::size_t first, std::size_t count);
+  const float* masked_surface_row(std::size_t row);
+  void search_masked_rows(std::size_t first, std::size_t count);
+  Span<Complex> masked_spectrum_of_b(std::size_t i) const;
+  Span<Complex> masked_sum(std::size_t i) const;
   void search_surface_rows(std::size_t first, std::size_t count);
+  const float* surface_row(std::size_t row);
+  PeakSpread translation_spread(const Curvature& curvature) const;
   void locate_peak();
   /// Rotation peaks that are tried.
   std::size_t rotation_count() const;
@@ -182,6 +209,7 @@ class Matcher {
   Status status_ = Status::ok;
 
   Span<const std::uint8_t> picture_;
+  Span<const std::uint8_t> observed_;
   Features* out_ = nullptr;
   std::uint8_t lowest_ = 0;  // of the picture's bytes
   std::uint8_t highest_ = 0;

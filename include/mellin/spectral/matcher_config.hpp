@@ -81,6 +81,13 @@ struct MatcherConfig {
   /// side * turns_per_bin: a spectrum's memory each. More than one picture is compared with it at half the cost. Has no
   /// influence on the results. Only with turns_per_bin.
   std::uint16_t kept_turns = 0;
+  /// Only what both pictures have observed counts in the translation step (IV-B1, masked registration [19]): its peak
+  /// is the normalised cross-correlation of the overlap, -1 … 1, without low-pass or whitening. Takes the observed
+  /// masks of pictures, and seven spectra of memory more; a comparison costs some four times as much. The correlation
+  /// is cyclic: borders that nobody observed keep the two ends of a picture apart.
+  bool masked = false;
+  /// Overlaps of less than this share of the smaller observed area have no peak, over 0 up to 1. For `masked`.
+  float min_overlap = 0.3F;
   /// Lines (rows, columns, rings) that one step() treats; 0 means a whole pass.
   std::uint16_t lines_per_step = 0;
 };
@@ -94,7 +101,8 @@ constexpr bool is_valid(const MatcherConfig& config) {
          config.edge_margin <= 0.1F && config.preprocessing <= Preprocessing::blur &&
          config.rotation <= RotationMode::log_polar_scale && config.high_pass <= HighPass::reddy &&
          config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F && config.min_peak <= 1.0F &&
-         config.turns_per_bin <= 8 && config.kept_turns <= config.side * config.turns_per_bin;
+         config.min_overlap > 0.0F && config.min_overlap <= 1.0F && config.turns_per_bin <= 8 &&
+         config.kept_turns <= config.side * config.turns_per_bin;
 }
 
 /// The paper taken at its word: phase-only matched filters without low-pass for rotation with scale and for
