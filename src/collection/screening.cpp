@@ -72,6 +72,7 @@ Features SpectralScreening::cached_features(std::uint32_t index) const {
   const std::size_t polar = Features::polar_count(config_.matcher);
   f.polar = memory_.polar.subspan(slot * polar, polar);
   f.floor = memory_.floors[slot];
+  f.curvature = memory_.curvatures[slot];
   f.ready = memory_.ready[slot] != 0;
   return f;
 }
@@ -166,6 +167,7 @@ bool SpectralScreening::step() {
     case Stage::features:
       if (matcher_.step()) {
         memory_.floors[a_] = features_a_.floor;
+        memory_.curvatures[a_] = features_a_.curvature;
         memory_.ready[a_] = features_a_.ready ? 1 : 0;
         stage_ = Stage::idle;
       }

@@ -175,22 +175,24 @@ void Matcher::locate_peak() {
   hypothesis.peak = peak_.value;
   hypothesis.rotation_peak = rotation.strength;
   hypothesis.scale = rotation.scale;
-  const PeakSpread spread = translation_spread(curvature(window, radius));
+  const PeakSpread spread = translation_spread(window, radius);
   const double square_m = pixel_m * pixel_m;
   hypothesis.covariance = {static_cast<float>(spread.xx * square_m), static_cast<float>(spread.xy * square_m),
                            static_cast<float>(spread.yy * square_m), rotation.variance + turn_variance()};
   add_hypothesis(hypothesis);
 }
 
-/// Of the peak under way, pixels squared. A masked correlation is a coefficient: the share 1 - r^2 that the other
-/// picture does not explain is noise, independent by lines, see RotationEstimator::variance().
-PeakSpread Matcher::translation_spread(const Curvature& curvature) const {
-  constexpr double kIndependentLines = 6.0;
+/// Of the peak under way, pixels squared: see PeakCovariance.
+PeakSpread Matcher::translation_spread(const PeakWindow& window, int radius) const {
+  // Lines' worth of independent samples. Whitening leaves a lower peak than a coefficient would be, which counts more.
+  const double lines = config_.masked ? 6.0 : 48.0;
   const auto side = static_cast<double>(config_.side);
-  const auto r = static_cast<double>(peak_.value);
-  const double most = 0.25 * side;
-  PeakSpread spread = config_.masked ? spread_by_noise(curvature, (1.0 - r * r) / (r * kIndependentLines * side), most)
-                                     : spread_by_gradient(curvature, gradient_noise_, most);
+  const double r = std::min(1.0, static_cast<double>(peak_.value));
+  const PictureCurvature& own = a_.curvature;
+  const Curvature shape = config_.masked ? curvature(window, radius)
+                                         : Curvature{r * static_cast<double>(own.xx), r * static_cast<double>(own.xy),
+                                                     r * static_cast<double>(own.yy)};
+  PeakSpread spread = spread_by_noise(shape, (1.0 - r * r) / (r * lines * side), 0.25 * side);
   const double fit = fit_variance(config_, config_.masked ? PeakKind::coefficient : PeakKind::whitened);
   spread.xx += fit;
   spread.yy += fit;

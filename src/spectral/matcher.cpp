@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <iterator>
 
 namespace mellin {
 
@@ -55,30 +56,12 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUn
   query_ = nullptr;
   margin_ = EdgeBlur::margin(config.side, config.edge_margin);
   fill_lowpass(config.lowpass_sigma, memory.lowpass);
-  weigh_filter();
-  return Status::ok;
-}
-
-/// The sums over the low-pass that scale the surface to 1 for equal pictures, and tell its gradient's variance where
-/// all phases are random: (2 pi)^2 sum(fx^2 W^2) / sum(W)^2, W the product of the weights of both axes. Pictures differ
-/// by walls rather than by pixels, so fewer phases are independent: they grow with the side, not with its square
-/// (measured, tests/matcher_covariance_test.cpp).
-void Matcher::weigh_filter() {
-  constexpr double kIndependentLines = 64.0;
-  const std::size_t side = config_.side;
   double sum = 0.0;
-  double square_sum = 0.0;
-  double slope_sum = 0.0;
-  for (std::size_t i = 0; i < side; ++i) {
-    const auto weight = static_cast<double>(memory_.lowpass[i]);
-    const double radians = kTwoPi * static_cast<double>(std::min(i, side - i)) / static_cast<double>(side);
-    sum += weight;
-    square_sum += weight * weight;
-    slope_sum += weight * weight * radians * radians;
+  for (const float weight : memory.lowpass) {
+    sum += static_cast<double>(weight);
   }
   filter_scale_ = static_cast<float>(1.0 / (sum * sum));
-  const double lines = static_cast<double>(side) / kIndependentLines;
-  gradient_noise_ = std::max(1.0, lines) * slope_sum * square_sum / (sum * sum * sum * sum);
+  return Status::ok;
 }
 
 Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out, Span<const std::uint8_t> observed) {
@@ -99,6 +82,7 @@ Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out, S
   lowest_ = 255;
   highest_ = 0;
   sum_ = 0.0;
+  std::fill(std::begin(moments_), std::end(moments_), 0.0);
   status_ = Status::ok;
   stage_ = Stage::load;
   line_ = 0;
@@ -239,6 +223,7 @@ Matcher::Stage Matcher::after(Stage stage) {
     case Stage::blur_edges:
       return Stage::picture_rows;
     case Stage::picture_rows:
+      end_curvature();
       return config_.masked ? Stage::masked_rows : Stage::picture_columns;
     case Stage::masked_rows:
       return out_->filter.empty() ? Stage::picture_columns : Stage::masked_columns;

@@ -14,6 +14,14 @@ namespace mellin {
 /// What a picture's features are kept for: to be `a` of a match takes filter and polar, to be `b` image and polar.
 enum class FeatureUse : std::uint8_t { as_a, as_b, both };
 
+/// Second differences of a picture's correlation with itself at no shift, turned positive, as shares of its value
+/// there: how sharply the picture can tell where it lies. A corridor's are small along it.
+struct PictureCurvature {
+  float xx = 0.0F;
+  float xy = 0.0F;
+  float yy = 0.0F;
+};
+
 /// A picture as the matcher needs it, over the caller's memory. Kept between matches as long as the caller likes; may
 /// be copied with its memory. Empty spans are left out by extract().
 struct Features {
@@ -22,7 +30,8 @@ struct Features {
                          ///< the picture where observed, of the mask, of the picture's square where observed
   Span<Complex> polar;   ///< what the rotation is found by, see RotationEstimator; polar_count(config)
   float floor = 0.0F;    ///< what is added to magnitudes when a turned copy is whitened
-  bool ready = false;    ///< extract() has succeeded
+  PictureCurvature curvature;
+  bool ready = false;  ///< extract() has succeeded
 
   static constexpr std::size_t image_count(const MatcherConfig& config) {
     return (config.masked ? 2U : 1U) * std::size_t{config.side} * config.side;

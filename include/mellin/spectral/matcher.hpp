@@ -27,8 +27,13 @@
 
 namespace mellin {
 
-/// Covariance of a registered pose from the shapes of its correlation peaks: x and y m^2, theta rad^2, theta taken for
-/// independent of the place.
+/// Covariance of a registered pose: x and y m^2, theta rad^2, theta taken for independent of the place.
+///
+/// For a correlation coefficient r the share 1 - r^2 of the other picture is unexplained: noise. It moves the peak by
+/// H^-1 times its gradient, H the peak's curvature, so that the covariance is (1 - r^2) / (r n) H^-1. n is how many
+/// independent samples the noise has: pictures differ by walls, not by pixels, so n grows with the side (measured,
+/// tests/matcher_covariance_test.cpp). A phase-only filter makes every peak sharp, in a corridor, too; there r is its
+/// peak, and H that of picture a's correlation with itself. Added is what the fit of a peak leans to.
 struct PeakCovariance {
   float xx = 0.0F;
   float xy = 0.0F;
@@ -54,7 +59,6 @@ struct MatchOptions {
   float min_rotation_peak = -1.0F;  ///< no translation is sought at rotations whose coefficient is lower
 };
 
-struct Curvature;
 struct PeakSpread;
 
 class Matcher {
@@ -158,8 +162,9 @@ class Matcher {
   void run(Stage stage, std::size_t first, std::size_t count);
   Stage after(Stage stage);
 
-  void weigh_filter();
   ImageView picture_image() const;
+  void add_curvature(std::size_t row);
+  void end_curvature();
   void load_rows(std::size_t first, std::size_t count);
   void blur_edges(std::size_t first, std::size_t count);
   void transform_picture_rows(std::size_t first, std::size_t count);
@@ -188,7 +193,7 @@ class Matcher {
   Span<Complex> masked_sum(std::size_t i) const;
   void search_surface_rows(std::size_t first, std::size_t count);
   const float* surface_row(std::size_t row);
-  PeakSpread translation_spread(const Curvature& curvature) const;
+  PeakSpread translation_spread(const PeakWindow& window, int radius) const;
   void locate_peak();
   /// Rotation peaks that are tried.
   std::size_t rotation_count() const;
@@ -202,7 +207,6 @@ class Matcher {
   EdgeBlur edge_blur_;
   std::uint16_t margin_ = 0;
   float filter_scale_ = 1.0F;
-  double gradient_noise_ = 0.0;  // of a surface of random phases, along an axis, per pixel squared
 
   Stage stage_ = Stage::idle;
   std::size_t line_ = 0;  // next line of the stage
@@ -213,7 +217,8 @@ class Matcher {
   Features* out_ = nullptr;
   std::uint8_t lowest_ = 0;  // of the picture's bytes
   std::uint8_t highest_ = 0;
-  double sum_ = 0.0;  // of magnitudes
+  double sum_ = 0.0;        // of magnitudes
+  double moments_[5] = {};  // of the picture: its sum, that of its squares, of squared differences along x, y and both
 
   Features a_;
   Features b_;
