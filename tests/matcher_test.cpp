@@ -38,7 +38,14 @@ TEST_SUITE("matcher") {
     const auto check = [](const char* name, const MatcherConfig& config, const auto& expected) {
       CAPTURE(name);
       Bench bench(config);
-      const HypothesisList found = bench.match(golden_picture(golden::kPictureA), golden_picture(golden::kPictureB));
+      const Picture picture_a = golden_picture(golden::kPictureA);
+      const Picture picture_b = golden_picture(golden::kPictureB);
+      Features a = bench.carve();
+      Features b = bench.carve();
+      REQUIRE(bench.matcher.extract({picture_a.data(), picture_a.size()}, a, golden::kMaskA) == Status::ok);
+      REQUIRE(bench.matcher.extract({picture_b.data(), picture_b.size()}, b, golden::kMaskB) == Status::ok);
+      REQUIRE(bench.matcher.match(a, b) == Status::ok);
+      const HypothesisList& found = bench.matcher.hypotheses();
       REQUIRE(found.size() == std::size(expected));
       for (std::size_t i = 0; i < found.size(); ++i) {
         CHECK(found[i].a_T_b.x == doctest::Approx(expected[i][0]).epsilon(1e-3));
@@ -59,6 +66,9 @@ TEST_SUITE("matcher") {
     logarithmic.rotation = RotationMode::log_polar;
     logarithmic.peak_fit = PeakFit::gaussian;
     check("log-polar", logarithmic, golden::kLogPolar);
+    MatcherConfig masked = config_of(48);
+    masked.masked = true;
+    check("masked", masked, golden::kMasked);
     MatcherConfig paper = paper_matcher(48);
     paper.pixel_m = 1.0F;
     check("the paper's", paper, golden::kPaper);
