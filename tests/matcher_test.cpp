@@ -56,8 +56,10 @@ TEST_SUITE("matcher") {
         CHECK(static_cast<double>(found[i].scale) == doctest::Approx(expected[i][5]).epsilon(1e-4));
       }
     };
-    check("rings", config_of(48), golden::kHypotheses);
-    MatcherConfig linear = config_of(48);
+    MatcherConfig rings = config_of(48);
+    rings.peak_fit = PeakFit::centre_of_mass;
+    check("rings", rings, golden::kHypotheses);
+    MatcherConfig linear = rings;
     linear.rotation = RotationMode::linear_polar;
     linear.high_pass = HighPass::none;
     linear.com_radius = 2;
@@ -66,7 +68,7 @@ TEST_SUITE("matcher") {
     logarithmic.rotation = RotationMode::log_polar;
     logarithmic.peak_fit = PeakFit::gaussian;
     check("log-polar", logarithmic, golden::kLogPolar);
-    MatcherConfig masked = config_of(48);
+    MatcherConfig masked = rings;
     masked.masked = true;
     check("masked", masked, golden::kMasked);
     MatcherConfig paper = paper_matcher(48);
@@ -356,6 +358,7 @@ TEST_SUITE("matcher") {
       MatcherConfig config = config_of(96, 0.4F);
       config.lowpass_sigma = variant == 0 ? 0.0F : 0.25F;
       config.high_pass = variant == 1 ? HighPass::none : HighPass::radius;
+      config.peak_fit = variant < 2 ? PeakFit::gaussian : PeakFit::centre_of_mass;
       config.com_radius = static_cast<std::uint8_t>(variant == 2 ? 0 : (variant == 3 ? 3 : 1));
       Bench bench(config);
       const Pose2 a_T_b{1.7, -2.2, 2.5};
