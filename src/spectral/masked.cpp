@@ -42,20 +42,24 @@ Span<Complex> Matcher::masked_sum(std::size_t i) const {
   return memory_.masked.subspan((1 + i) * size, size);
 }
 
-/// Row spectra of a picture row by row: three rows, of the picture, its mask, its square.
-void Matcher::transform_masked_row(const float* picture, const float* mask, std::size_t row,
-                                   const Span<Complex> (&spectra)[3]) {
+/// A row of a block: of the picture where observed, of its mask, of its square.
+void Matcher::fill_masked_row(const float* picture, const float* mask, std::size_t row_in_block) {
   const std::size_t side = config_.side;
-  float* const values = memory_.rows.data();
+  const std::size_t block = Fft2::kBlock * side;
+  float* const values = memory_.masked_rows.data() + row_in_block * side;
   for (std::size_t i = 0; i < side; ++i) {
     const float weight = mask[i] >= 0.5F ? 1.0F : 0.0F;
     const float value = weight * picture[i];
-    values[kPicture * side + i] = value;
-    values[kMask * side + i] = weight;
-    values[kSquare * side + i] = value * value;
+    values[kPicture * block + i] = value;
+    values[kMask * block + i] = weight;
+    values[kSquare * block + i] = value * value;
   }
+}
+
+void Matcher::transform_masked_block(std::size_t row, std::size_t rows, const Span<Complex> (&spectra)[3]) {
+  const std::size_t block = Fft2::kBlock * std::size_t{config_.side};
   for (std::size_t i = 0; i < kSpectra; ++i) {
-    fft_.forward_rows(values + i * side, row, 1, spectra[i]);
+    fft_.forward_rows(memory_.masked_rows.data() + i * block, row, rows, spectra[i]);
   }
 }
 
@@ -64,16 +68,18 @@ void Matcher::transform_masked_rows(std::size_t first, std::size_t count) {
   const std::size_t pixels = side * side;
   const std::size_t size = spectrum_size(config_.side);
   const ImageView image = picture_image();
-  float* const line = memory_.rows.data() + kSpectra * side;
-  for (std::size_t r = first; r < first + count; ++r) {
-    float* const mask = out_->image.empty() ? line : out_->image.data() + pixels + r * side;
-    for (std::size_t c = 0; c < side; ++c) {
-      mask[c] = observed_.empty() || mask_bit(observed_, r * side + c) ? 1.0F : 0.0F;
+  for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
+    const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
+    for (std::size_t i = r; i < r + rows; ++i) {
+      float* const mask = out_->image.empty() ? memory_.rows.data() : out_->image.data() + pixels + i * side;
+      for (std::size_t c = 0; c < side; ++c) {
+        mask[c] = observed_.empty() || mask_bit(observed_, i * side + c) ? 1.0F : 0.0F;
+      }
+      fill_masked_row(image.row(i), mask, i - r);
     }
     if (!out_->filter.empty()) {
-      transform_masked_row(
-          image.row(r), mask, r,
-          {out_->filter.first(size), out_->filter.subspan(size, size), out_->filter.subspan(2 * size, size)});
+      transform_masked_block(
+          r, rows, {out_->filter.first(size), out_->filter.subspan(size, size), out_->filter.subspan(2 * size, size)});
     }
   }
 }
@@ -90,12 +96,16 @@ void Matcher::transform_masked_turned_rows(std::size_t first, std::size_t count)
   const std::size_t side = config_.side;
   const std::size_t pixels = side * side;
   const SinCosF turn = turn_under_way();
-  float* const picture = memory_.rows.data() + kSpectra * side;
+  float* const picture = memory_.rows.data();
   float* const mask = picture + side;
-  for (std::size_t r = first; r < first + count; ++r) {
-    turned_row({b_.image.first(pixels), config_.side}, turn, r, fft_.kernels(), picture);
-    turned_row({b_.image.subspan(pixels, pixels), config_.side}, turn, r, fft_.kernels(), mask);
-    transform_masked_row(picture, mask, r, {masked_spectrum_of_b(0), masked_spectrum_of_b(1), masked_spectrum_of_b(2)});
+  for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
+    const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
+    for (std::size_t i = 0; i < rows; ++i) {
+      turned_row({b_.image.first(pixels), config_.side}, turn, r + i, fft_.kernels(), picture);
+      turned_row({b_.image.subspan(pixels, pixels), config_.side}, turn, r + i, fft_.kernels(), mask);
+      fill_masked_row(picture, mask, i);
+    }
+    transform_masked_block(r, rows, {masked_spectrum_of_b(0), masked_spectrum_of_b(1), masked_spectrum_of_b(2)});
   }
 }
 
@@ -130,24 +140,25 @@ void Matcher::correlate_masked_columns(std::size_t first, std::size_t count) {
   }
 }
 
-/// Row `row` of the masked normalised cross-correlation (Padfield's equation 10), 0 where the overlap is too small.
-/// Valid until the next one.
-const float* Matcher::masked_surface_row(std::size_t row) {
+/// Rows of the masked normalised cross-correlation (Padfield's equation 10), 0 where the overlap is too small; valid
+/// until the next ones. `count` <= Fft2::kBlock.
+const float* Matcher::masked_surface_rows(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
   const std::size_t size = spectrum_size(config_.side);
+  const std::size_t block = Fft2::kBlock * side;
   const float scale = 1.0F / static_cast<float>(side * side);
-  float* const out = memory_.rows.data() + kSums * side;
+  float* const out = memory_.masked_rows.data() + kSums * block;
   const float* sums[kSums] = {};
   for (std::size_t s = 0; s < kSums; ++s) {
-    float* const line = memory_.rows.data() + s * side;
-    fft_.inverse_rows(masked_sum(s), row, 1, line);
-    sums[s] = line;
+    float* const rows = memory_.masked_rows.data() + s * block;
+    fft_.inverse_rows(masked_sum(s), first, count, rows);
+    sums[s] = rows;
   }
   const float least_pixels = std::max(1.0F, config_.min_overlap * std::min(total(a_.filter.subspan(kMask * size, size)),
                                                                            total(masked_spectrum_of_b(kMask))));
   const float least_f = kLeastEnergy * total(a_.filter.subspan(kSquare * size, size));
   const float least_g = kLeastEnergy * total(masked_spectrum_of_b(kSquare));
-  for (std::size_t i = 0; i < side; ++i) {
+  for (std::size_t i = 0; i < count * side; ++i) {
     const float pixels = scale * sums[kPixels][i];
     out[i] = 0.0F;
     // Half a pixel less: the sum is whole but for rounding.
@@ -168,11 +179,14 @@ const float* Matcher::masked_surface_row(std::size_t row) {
 
 void Matcher::search_masked_rows(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
-  for (std::size_t r = first; r < first + count; ++r) {
-    const float* const row = masked_surface_row(r);
-    const float top = highest(row, side);
-    if (top > peak_.value) {
-      peak_ = {top, r, static_cast<std::size_t>(std::find(row, row + side, top) - row)};
+  for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
+    const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
+    const float* row = masked_surface_rows(r, rows);
+    for (std::size_t i = r; i < r + rows; ++i, row += side) {
+      const float top = highest(row, side);
+      if (top > peak_.value) {
+        peak_ = {top, i, static_cast<std::size_t>(std::find(row, row + side, top) - row)};
+      }
     }
   }
 }

@@ -144,7 +144,7 @@ void Matcher::search_surface_rows(std::size_t first, std::size_t count) {
 /// Row `row` of the surface under way; valid until the next one.
 const float* Matcher::surface_row(std::size_t row) {
   if (config_.masked) {
-    return masked_surface_row(row);
+    return masked_surface_rows(row, 1);
   }
   fft_.inverse_rows(surface(), row, 1, memory_.rows.data());
   return memory_.rows.data();

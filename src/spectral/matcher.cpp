@@ -37,6 +37,7 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUn
                       memory.second.size() == memory.first.size() && memory.rows.size() == Fft2::kBlock * side &&
                       memory.lines.size() == 2 * (kFftLanes + 1) * side && memory.lowpass.size() == side &&
                       memory.masked.size() == (config.masked ? 7 * spectrum_size(config.side) : 0) &&
+                      memory.masked_rows.size() == (config.masked ? 7 * Fft2::kBlock * side : 0) &&
                       memory.turns.size() == config.kept_turns * spectrum_size(config.side);
   if (!enough) {
     return Status::insufficient_memory;

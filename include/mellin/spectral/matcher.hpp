@@ -65,12 +65,13 @@ class Matcher {
  public:
   struct Memory {
     Fft2::Memory fft;
-    Span<Complex> first;   ///< a spectrum
-    Span<Complex> second;  ///< a spectrum; scratch memory of extract()
-    Span<float> rows;      ///< Fft2::kBlock rows of an image
-    Span<Complex> lines;   ///< twice kFftLanes columns of a spectrum and one more
-    Span<float> lowpass;   ///< along one axis
-    Span<Complex> masked;  ///< seven spectra, for MatcherConfig::masked
+    Span<Complex> first;      ///< a spectrum
+    Span<Complex> second;     ///< a spectrum; scratch memory of extract()
+    Span<float> rows;         ///< Fft2::kBlock rows of an image
+    Span<Complex> lines;      ///< twice kFftLanes columns of a spectrum and one more
+    Span<float> lowpass;      ///< along one axis
+    Span<Complex> masked;     ///< seven spectra, for MatcherConfig::masked
+    Span<float> masked_rows;  ///< seven blocks of rows, likewise
     RotationEstimator::Memory rotation;
     Span<Complex> turns;             ///< spectra of the query, turned and whitened, MatcherConfig::kept_turns of them
     Span<std::uint16_t> turn_place;  ///< of each angle: where in `turns`, from 1 on; 0: not there
@@ -92,6 +93,7 @@ class Matcher {
     m.lines = work.template take<Complex>(2 * (kFftLanes + 1) * side, Part::spectral, Region::fast);
     m.lowpass = tables.template take<float>(side, Part::spectral, Region::fast);
     m.masked = work.template take<Complex>(config.masked ? 7 * spectrum_size(config.side) : 0, Part::spectral);
+    m.masked_rows = work.template take<float>(config.masked ? 7 * Fft2::kBlock * side : 0, Part::spectral);
     m.rotation = RotationEstimator::carve(tables, work, config);
     m.turns = work.template take<Complex>(config.kept_turns * spectrum_size(config.side), Part::spectral);
     m.turn_place =
@@ -180,14 +182,14 @@ class Matcher {
   void whiten_turned_columns(std::size_t first, std::size_t count);
   void filter_turned_columns(std::size_t first, std::size_t count);
   SinCosF turn_under_way() const;
-  void transform_masked_row(const float* picture, const float* mask, std::size_t row,
-                            const Span<Complex> (&spectra)[3]);
+  void fill_masked_row(const float* picture, const float* mask, std::size_t row_in_block);
+  void transform_masked_block(std::size_t row, std::size_t rows, const Span<Complex> (&spectra)[3]);
   void transform_masked_rows(std::size_t first, std::size_t count);
   void transform_masked_columns(std::size_t first, std::size_t count);
   void transform_masked_turned_rows(std::size_t first, std::size_t count);
   void transform_masked_turned_columns(std::size_t first, std::size_t count);
   void correlate_masked_columns(std::size_t first, std::size_t count);
-  const float* masked_surface_row(std::size_t row);
+  const float* masked_surface_rows(std::size_t first, std::size_t count);
   void search_masked_rows(std::size_t first, std::size_t count);
   Span<Complex> masked_spectrum_of_b(std::size_t i) const;
   Span<Complex> masked_sum(std::size_t i) const;

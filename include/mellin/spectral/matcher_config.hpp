@@ -86,7 +86,7 @@ struct MatcherConfig {
   std::uint16_t kept_turns = 0;
   /// Only what both pictures have observed counts in the translation step (IV-B1, masked registration [19]): its peak
   /// is the normalised cross-correlation of the overlap, -1 … 1, without low-pass or whitening. Takes the observed
-  /// masks of pictures, and seven spectra of memory more; a comparison costs some four times as much. The correlation
+  /// masks of pictures, and seven spectra of memory more; a comparison costs five to six times as much. The correlation
   /// is cyclic: borders that nobody observed keep the two ends of a picture apart.
   bool masked = false;
   /// Overlaps of less than this share of the smaller observed area have no peak, over 0 up to 1. For `masked`.
