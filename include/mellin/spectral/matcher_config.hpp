@@ -35,6 +35,11 @@ struct MatcherConfig {
   float edge_margin = 0.04F;
   /// Weighs magnitudes in proportion to their frequency before the rotation is sought (high-pass, Fig. 1b).
   bool high_pass = true;
+  /// What observed free space counts in the picture that is matched, where an obstacle counts 1 and what was not
+  /// observed 0: an obstacle on the other's free space then speaks against a shift as one on an obstacle speaks for it,
+  /// and the unknown says nothing. 0 is the paper's way, which takes unobserved space for free (IV-B1). Without an
+  /// observed mask it has no effect. 0 … 4.
+  float free_weight = 1.0F;
   /// Lines (rows, columns, rings) that one step() treats; 0 means a whole pass.
   std::uint16_t lines_per_step = 0;
 };
@@ -45,7 +50,7 @@ constexpr bool is_valid(const MatcherConfig& config) {
          config.peak_share <= 1.0F && config.max_peaks >= 1 && config.max_peaks <= kMaxRotationPeaks &&
          config.com_radius <= 3 && config.lowpass_sigma >= 0.0F && config.lowpass_sigma < 1e3F &&
          config.whitening_floor > 0.0F && config.whitening_floor <= 1.0F && config.edge_margin > 0.0F &&
-         config.edge_margin <= 0.1F;
+         config.edge_margin <= 0.1F && config.free_weight >= 0.0F && config.free_weight <= 4.0F;
 }
 
 }  // namespace mellin
