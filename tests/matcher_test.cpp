@@ -502,7 +502,7 @@ TEST_SUITE("matcher") {
       CAPTURE(variant);
       MatcherConfig config = config_of(96, 0.4F);
       config.lowpass_sigma = variant == 0 ? 0.0F : 0.25F;
-      config.high_pass = variant != 1;
+      config.high_pass = variant == 1 ? HighPass::none : HighPass::radius;
       config.com_radius = static_cast<std::uint8_t>(variant == 2 ? 0 : (variant == 3 ? 3 : 1));
       Bench bench(config);
       const Pose2 a_T_b{1.7, -2.2, 2.5};

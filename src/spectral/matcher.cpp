@@ -46,7 +46,7 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
   }
   const Status tabulated = rotation_.init(
       config, memory.rotation,
-      {as_floats(memory.second).first(spectrum_size(config.side)), memory.rows.first(side), memory.lines});
+      {as_floats(memory.second).first(spectrum_size(config.side)), memory.rows, memory.lines, memory.first});
   if (tabulated != Status::ok) {
     return tabulated;
   }

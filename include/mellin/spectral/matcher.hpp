@@ -30,7 +30,8 @@ namespace mellin {
 struct Hypothesis {
   Pose2 a_T_b;                 ///< pose of b's frame in a's, m and rad, theta in [-pi, pi)
   float peak = 0.0F;           ///< of the phase-only filter: 1 for equal pictures, near 0 for unrelated ones
-  float rotation_peak = 0.0F;  ///< correlation coefficient of the rings at this rotation, -1 … 1
+  float rotation_peak = 0.0F;  ///< of the correlation that gave the rotation: 1 for equal pictures, over 0
+  float scale = 1.0F;          ///< b enlarged by it about its origin, then moved by a_T_b, looks like a
 };
 
 /// Best first.
