@@ -7,6 +7,7 @@
 namespace mellin::program {
 
 void add_entropy(CLI::App& app);   ///< mellin entropy
+void add_eval(CLI::App& app);      ///< mellin eval; its kinds add themselves to it, see eval.cpp
 void add_map(CLI::App& app);       ///< mellin map
 void add_match(CLI::App& app);     ///< mellin match
 void add_optimize(CLI::App& app);  ///< mellin optimize

@@ -8,6 +8,7 @@ int main(int argc, char** argv) {
   CLI::App app{"Hierarchical 2D lidar SLAM: maps logs, registers grids, optimises pose graphs"};
   app.require_subcommand(1);
   mellin::program::add_entropy(app);
+  mellin::program::add_eval(app);
   mellin::program::add_map(app);
   mellin::program::add_match(app);
   mellin::program::add_optimize(app);

@@ -1,0 +1,11 @@
+// mellin eval: the paper's evaluation (Section V), a command a kind.
+#include "program/commands.hpp"
+
+namespace mellin::program {
+
+void add_eval(CLI::App& app) {
+  CLI::App* eval = app.add_subcommand("eval", "The paper's evaluation: curves, tables and pictures");
+  eval->require_subcommand(1);
+}
+
+}  // namespace mellin::program
