@@ -181,7 +181,7 @@ std::vector<Pair> match_all(const std::vector<Submap>& submaps, std::uint16_t si
   MeasureArena measure;
   Matcher::carve(measure, config);
   for (std::size_t i = 0; i < submaps.size(); ++i) {
-    Features::carve(measure, side);
+    Features::carve(measure, config);
   }
   std::vector<double> memory(measure.use().total() / sizeof(double));
   Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(memory.data()), measure.use().total()));
@@ -191,7 +191,7 @@ std::vector<Pair> match_all(const std::vector<Submap>& submaps, std::uint16_t si
   std::vector<Features> features;
   for (const Submap& submap : submaps) {
     pictures.push_back(digest_of(submap, side));
-    features.push_back(Features::carve(arena, side));
+    features.push_back(Features::carve(arena, config));
     REQUIRE(matcher.extract({pictures.back().obstacles.data(), pictures.back().obstacles.size()}, features.back()) ==
             Status::ok);
   }

@@ -34,11 +34,11 @@ class Bench {
   /// Features over memory that lives as long as the bench.
   Features carve(FeatureUse use = FeatureUse::both) {
     MeasureArena measure;
-    Features::carve(measure, config_.side, use);
+    Features::carve(measure, config_, use);
     feature_memory_.emplace_back(measure.use().total() / sizeof(double));
     std::vector<double>& memory = feature_memory_.back();
     Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(memory.data()), measure.use().total()));
-    return Features::carve(arena, config_.side, use);
+    return Features::carve(arena, config_, use);
   }
   Features extract(const Picture& picture, FeatureUse use = FeatureUse::both) {
     Features features = carve(use);

@@ -68,7 +68,8 @@ Features SpectralScreening::cached_features(std::uint32_t index) const {
   Features f;
   f.image = memory_.images.subspan(slot * Features::image_count(side), Features::image_count(side));
   f.filter = memory_.filters.subspan(slot * Features::filter_count(side), Features::filter_count(side));
-  f.rings = memory_.rings.subspan(slot * Features::rings_count(side), Features::rings_count(side));
+  const std::size_t polar = Features::polar_count(config_.matcher);
+  f.polar = memory_.polar.subspan(slot * polar, polar);
   f.floor = memory_.floors[slot];
   f.ready = memory_.ready[slot] != 0;
   return f;

@@ -3,50 +3,12 @@
 #include <cmath>
 
 #include "mellin/spectral/matcher.hpp"
+#include "spectral/peaks.hpp"
 #include "spectral/resample.hpp"
 
 namespace mellin {
 
 namespace {
-
-/// Rotation peaks are the highest among two neighbours on either side, so that one hump gives one peak.
-constexpr std::size_t kPeakNeighbours = 2;
-
-/// Index i + offset in a cyclic line of `size`; |offset| <= size.
-std::size_t cyclic(std::size_t i, int offset, std::size_t size) {
-  return (i + size + static_cast<std::size_t>(static_cast<std::ptrdiff_t>(offset))) % size;
-}
-
-bool is_peak(Span<const float> line, std::size_t i) {
-  for (std::size_t k = 1; k <= kPeakNeighbours; ++k) {
-    const int offset = static_cast<int>(k);
-    // Of equal neighbours the first is the peak.
-    if (line[i] <= line[cyclic(i, -offset, line.size())] || line[i] < line[cyclic(i, offset, line.size())]) {
-      return false;
-    }
-  }
-  return true;
-}
-
-float highest(const float* values, std::size_t count) {
-  // Lanes without order between them, so that the compiler may take them side by side. Sides are even.
-  float lanes[2 * Fft2::kBlock] = {};
-  constexpr std::size_t kLanes = 2 * Fft2::kBlock;
-  std::size_t i = 0;
-  for (; i + kLanes <= count; i += kLanes) {
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      lanes[k] = values[i + k] > lanes[k] ? values[i + k] : lanes[k];
-    }
-  }
-  float result = 0.0F;
-  for (; i < count; ++i) {
-    result = std::max(result, values[i]);
-  }
-  for (const float lane : lanes) {
-    result = std::max(result, lane);
-  }
-  return result;
-}
 
 /// A shift in [-side, side] of a periodic picture, as the one nearest to none: [-side / 2, side / 2).
 double nearest_shift(double shift, std::size_t side) {
@@ -56,55 +18,15 @@ double nearest_shift(double shift, std::size_t side) {
 
 }  // namespace
 
-/// The correlations of all rings at once: their cross spectra are summed before the one inverse transform.
-void Matcher::correlate_rings(std::size_t first, std::size_t count) {
-  const std::size_t width = config_.side / 2U + 1U;
-  Complex* const sum = cross_spectrum().data();
-  for (std::size_t i = first; i < first + count; ++i) {
-    const Complex* const a = a_.rings.data() + i * width;
-    const Complex* const b = b_.rings.data() + i * width;
-    for (std::size_t k = 0; k < width; ++k) {
-      sum[k].re += a[k].re * b[k].re + a[k].im * b[k].im;
-      sum[k].im += a[k].im * b[k].re - a[k].re * b[k].im;
-    }
-  }
-}
-
-/// All high peaks, not only the highest (IV-B3), their angles refined by the centre of mass (Eq. 3).
-void Matcher::find_rotations() {
-  rotations_.clear();
-  const std::size_t side = config_.side;
-  const Span<float> correlation = memory_.correlation;
-  fft_.inverse_line(cross_spectrum().data(), correlation.data());
-  const float least = std::max(config_.peak_share * highest(correlation.data(), side), options_.min_rotation_peak);
+std::size_t Matcher::rotation_count() const {
   const std::size_t most =
       options_.max_peaks == 0 ? config_.max_peaks : std::min(options_.max_peaks, config_.max_peaks);
-  const int radius = config_.com_radius;
-  for (std::size_t i = 0; i < side; ++i) {
-    const float strength = correlation[i];
-    if (!(strength > 0.0F) || strength < least || !is_peak(correlation, i)) {
-      continue;
-    }
-    float mass = 0.0F;
-    float moment = 0.0F;
-    for (int d = -radius; d <= radius; ++d) {
-      const float value = std::max(correlation[cyclic(i, d, side)], 0.0F);
-      mass += value;
-      moment += value * static_cast<float>(d);
-    }
-    const double bin = static_cast<double>(i) + static_cast<double>(moment / mass);
-    std::size_t at = 0;
-    while (at < rotations_.size() && rotations_[at].strength >= strength) {
-      ++at;
-    }
-    rotations_.insert(at, {bin * kPi / static_cast<double>(side), strength});
-  }
-  rotation_count_ = std::min(rotations_.size(), most);
+  return std::min(rotation_.peaks().size(), most);
 }
 
 void Matcher::transform_turned_rows(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
-  const SinCos turn = sincos(rotations_[rotation_].angle_rad);
+  const SinCos turn = sincos(rotation_.peaks()[rotation_index_].angle_rad);
   const SinCosF turn_f{static_cast<float>(turn.sin), static_cast<float>(turn.cos)};
   const ImageView image{b_.image, config_.side};
   for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
@@ -191,7 +113,7 @@ void Matcher::locate_peak() {
   const double x = static_cast<double>(best_column_) + static_cast<double>(moment_x / mass) - mirrored;
   const double y = static_cast<double>(best_row_) + static_cast<double>(moment_y / mass) - mirrored;
   const auto pixel_m = static_cast<double>(config_.pixel_m);
-  const RotationPeak& rotation = rotations_[rotation_];
+  const RotationPeak& rotation = rotation_.peaks()[rotation_index_];
   Hypothesis hypothesis;
   hypothesis.a_T_b = {nearest_shift(x, side) * pixel_m, nearest_shift(y, side) * pixel_m,
                       wrap_angle(rotation.angle_rad + (half_turn_ ? kPi : 0.0))};

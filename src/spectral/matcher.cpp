@@ -18,18 +18,10 @@ void fill_lowpass(float sigma, Span<float> lowpass) {
   }
 }
 
-/// Half a turn in `side` steps, from -90 degrees on: the half plane that a spectrum stores.
-void fill_directions(Span<Complex> directions) {
-  for (std::size_t i = 0; i < directions.size(); ++i) {
-    const SinCos turn = sincos(kPi * static_cast<double>(i) / static_cast<double>(directions.size()));
-    directions[i] = {static_cast<float>(turn.sin), static_cast<float>(-turn.cos)};
-  }
-}
-
-bool fits(const Features& features, std::uint16_t side) {
-  return (features.image.empty() || features.image.size() == Features::image_count(side)) &&
-         (features.filter.empty() || features.filter.size() == Features::filter_count(side)) &&
-         features.rings.size() == Features::rings_count(side);
+bool fits(const Features& features, const MatcherConfig& config) {
+  return (features.image.empty() || features.image.size() == Features::image_count(config.side)) &&
+         (features.filter.empty() || features.filter.size() == Features::filter_count(config.side)) &&
+         features.polar.size() == Features::polar_count(config);
 }
 
 }  // namespace
@@ -42,8 +34,7 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
   const std::size_t side = config.side;
   const bool enough = memory.first.size() == spectrum_size(config.side) &&
                       memory.second.size() == memory.first.size() && memory.rows.size() == Fft2::kBlock * side &&
-                      memory.lines.size() == 3 * kFftLanes * side && memory.directions.size() == side &&
-                      memory.lowpass.size() == side && memory.correlation.size() == side;
+                      memory.lines.size() == 3 * kFftLanes * side && memory.lowpass.size() == side;
   if (!enough) {
     return Status::insufficient_memory;
   }
@@ -51,11 +42,16 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
   if (planned != Status::ok) {
     return planned;
   }
+  const Status tabulated = rotation_.init(
+      config, memory.rotation,
+      {as_floats(memory.second).first(spectrum_size(config.side)), memory.rows.first(side), memory.lines});
+  if (tabulated != Status::ok) {
+    return tabulated;
+  }
   config_ = config;
   memory_ = memory;
   margin_ = EdgeBlur::margin(config.side, config.edge_margin);
   fill_lowpass(config.lowpass_sigma, memory.lowpass);
-  fill_directions(memory.directions);
   double sum = 0.0;
   for (const float weight : memory.lowpass) {
     sum += static_cast<double>(weight);
@@ -65,8 +61,7 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
 }
 
 Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out) {
-  const bool valid =
-      fft_.side() > 0 && picture.size() == Features::image_count(config_.side) && fits(out, config_.side);
+  const bool valid = fft_.side() > 0 && picture.size() == Features::image_count(config_.side) && fits(out, config_);
   assert(valid);
   stage_ = Stage::idle;
   out.ready = false;
@@ -85,8 +80,7 @@ Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out) {
 }
 
 Status Matcher::begin_match(const Features& a, const Features& b, const MatchOptions& options) {
-  const bool valid =
-      fft_.side() > 0 && fits(a, config_.side) && fits(b, config_.side) && !a.filter.empty() && !b.image.empty();
+  const bool valid = fft_.side() > 0 && fits(a, config_) && fits(b, config_) && !a.filter.empty() && !b.image.empty();
   assert(valid);
   stage_ = Stage::idle;
   hypotheses_.clear();
@@ -99,9 +93,9 @@ Status Matcher::begin_match(const Features& a, const Features& b, const MatchOpt
   a_ = a;
   b_ = b;
   options_ = options;
-  std::fill(cross_spectrum().begin(), cross_spectrum().end(), Complex{});
+  rotation_.begin_estimate(a.polar, b.polar, options.min_rotation_peak);
   status_ = Status::ok;
-  stage_ = Stage::correlate_rings;
+  stage_ = Stage::estimate_rotation;
   line_ = 0;
   return Status::ok;
 }
@@ -109,6 +103,12 @@ Status Matcher::begin_match(const Features& a, const Features& b, const MatchOpt
 bool Matcher::step() {
   if (stage_ == Stage::idle) {
     return true;
+  }
+  if (stage_ == Stage::describe_rotation || stage_ == Stage::estimate_rotation) {
+    if (rotation_.step(fft_, config_.lines_per_step)) {
+      stage_ = after(stage_);
+    }
+    return stage_ == Stage::idle;
   }
   const std::size_t all = lines_of(stage_);
   const std::size_t left = all - line_;
@@ -136,11 +136,8 @@ std::size_t Matcher::lines_of(Stage stage) const {
     case Stage::whiten:
     case Stage::turned_columns:
       return side / 2 + 1;
-    case Stage::rings:
-    case Stage::scale_rings:
-    case Stage::correlate_rings:
-      return side / 2;
-    case Stage::find_rotations:
+    case Stage::describe_rotation:
+    case Stage::estimate_rotation:
     case Stage::locate_peak:
     case Stage::idle:
       break;
@@ -160,14 +157,6 @@ void Matcher::run(Stage stage, std::size_t first, std::size_t count) {
       return transform_picture_columns(first, count);
     case Stage::whiten:
       return whiten_columns(first, count);
-    case Stage::rings:
-      return sample_rings(first, count);
-    case Stage::scale_rings:
-      return scale_rings(first, count);
-    case Stage::correlate_rings:
-      return correlate_rings(first, count);
-    case Stage::find_rotations:
-      return find_rotations();
     case Stage::turned_rows:
       return transform_turned_rows(first, count);
     case Stage::turned_columns:
@@ -176,6 +165,8 @@ void Matcher::run(Stage stage, std::size_t first, std::size_t count) {
       return search_surface_rows(first, count);
     case Stage::locate_peak:
       return locate_peak();
+    case Stage::describe_rotation:
+    case Stage::estimate_rotation:
     case Stage::idle:
       return;
   }
@@ -196,23 +187,17 @@ Matcher::Stage Matcher::after(Stage stage) {
       return Stage::picture_columns;
     case Stage::picture_columns:
       end_magnitudes();
-      return out_->filter.empty() ? Stage::rings : Stage::whiten;
+      rotation_.begin_describe(out_->polar);
+      return out_->filter.empty() ? Stage::describe_rotation : Stage::whiten;
     case Stage::whiten:
-      return Stage::rings;
-    case Stage::rings:
-      if (!(sum_ > 0.0)) {
-        status_ = Status::degenerate;
-        return Stage::idle;
-      }
-      return Stage::scale_rings;
-    case Stage::scale_rings:
-      out_->ready = true;
+      return Stage::describe_rotation;
+    case Stage::describe_rotation:
+      status_ = rotation_.status();
+      out_->ready = status_ == Status::ok;
       return Stage::idle;
-    case Stage::correlate_rings:
-      return Stage::find_rotations;
-    case Stage::find_rotations:
-      rotation_ = 0;
-      return rotation_count_ == 0 ? Stage::idle : Stage::turned_rows;
+    case Stage::estimate_rotation:
+      rotation_index_ = 0;
+      return rotation_count() == 0 ? Stage::idle : Stage::turned_rows;
     case Stage::turned_rows:
       return Stage::turned_columns;
     case Stage::turned_columns:
@@ -227,7 +212,7 @@ Matcher::Stage Matcher::after(Stage stage) {
         best_ = 0.0F;
         return Stage::surface_rows;
       }
-      return ++rotation_ == rotation_count_ ? Stage::idle : Stage::turned_rows;
+      return ++rotation_index_ == rotation_count() ? Stage::idle : Stage::turned_rows;
     case Stage::idle:
       break;
   }

@@ -172,8 +172,8 @@ struct Bench {
 
   mellin::MatcherConfig config;
   Carved<mellin::Matcher, mellin::MatcherConfig> matcher_memory{config};
-  Carved<mellin::Features, std::uint16_t> a{config.side};
-  Carved<mellin::Features, std::uint16_t> b{config.side};
+  Carved<mellin::Features, mellin::MatcherConfig> a{config};
+  Carved<mellin::Features, mellin::MatcherConfig> b{config};
   mellin::Matcher matcher;
   std::vector<std::uint8_t> pixels_a;
   std::vector<std::uint8_t> pixels_b;

@@ -153,10 +153,8 @@ class Pair {
     Matcher matcher;
     require(matcher.init(config, matcher_memory.carve([&](auto& arena) { return Matcher::carve(arena, config); })),
             "matcher");
-    Features features_a =
-        memory_a.carve([&](auto& arena) { return Features::carve(arena, config.side, FeatureUse::as_a); });
-    Features features_b =
-        memory_b.carve([&](auto& arena) { return Features::carve(arena, config.side, FeatureUse::as_b); });
+    Features features_a = memory_a.carve([&](auto& arena) { return Features::carve(arena, config, FeatureUse::as_a); });
+    Features features_b = memory_b.carve([&](auto& arena) { return Features::carve(arena, config, FeatureUse::as_b); });
     std::vector<Candidate> found;
     if (!extract(matcher, a_, features_a) || !extract(matcher, b_, features_b)) {
       return found;

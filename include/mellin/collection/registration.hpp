@@ -53,8 +53,8 @@ class SpectralRegistration final : public GridMatcher {
     const std::size_t classes = std::size_t{config.class_side} * config.class_side;
     Memory m;
     m.matcher = Matcher::carve(tables, work, config.matcher);
-    m.features_a = Features::carve(work, side, FeatureUse::as_a);
-    m.features_b = Features::carve(work, side, FeatureUse::as_b);
+    m.features_a = Features::carve(work, config.matcher, FeatureUse::as_a);
+    m.features_b = Features::carve(work, config.matcher, FeatureUse::as_b);
     m.picture.obstacles = work.template take<std::uint8_t>(std::size_t{side} * side, Part::spectral);
     m.picture.side = side;
     m.classes_a = work.template take<std::uint8_t>(classes, Part::spectral);

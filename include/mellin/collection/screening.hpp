@@ -32,7 +32,7 @@ class SpectralScreening final : public DigestMatcher {
     Span<std::uint8_t> digests;  ///< submap by submap, or the two held ones: obstacles, observed mask, free mask
     Span<float> images;          ///< of the cached features, submap by submap …
     Span<Complex> filters;
-    Span<Complex> rings;
+    Span<Complex> polar;
     Span<float> floors;
     Span<std::uint8_t> ready;
     Features features_a;  ///< … or of the two that are compared
@@ -66,12 +66,12 @@ class SpectralScreening final : public DigestMatcher {
       const std::size_t slots = config.max_submaps;
       m.images = kept.template take<float>(slots * Features::image_count(side), Part::digests);
       m.filters = kept.template take<Complex>(slots * Features::filter_count(side), Part::digests);
-      m.rings = kept.template take<Complex>(slots * Features::rings_count(side), Part::digests);
+      m.polar = kept.template take<Complex>(slots * Features::polar_count(config.matcher), Part::digests);
       m.floors = kept.template take<float>(slots, Part::digests);
       m.ready = kept.template take<std::uint8_t>(slots, Part::digests);
     } else {
-      m.features_a = Features::carve(work, side, FeatureUse::as_a);
-      m.features_b = Features::carve(work, side, FeatureUse::as_b);
+      m.features_a = Features::carve(work, config.matcher, FeatureUse::as_a);
+      m.features_b = Features::carve(work, config.matcher, FeatureUse::as_b);
     }
     m.matcher = Matcher::carve(kept, work, config.matcher);
     m.classes_a = work.template take<std::uint8_t>(pixels, Part::spectral);

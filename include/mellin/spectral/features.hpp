@@ -1,0 +1,47 @@
+// A picture as the spectral matcher needs it, made once and kept between matches.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "mellin/core/arena.hpp"
+#include "mellin/core/span.hpp"
+#include "mellin/spectral/fft2.hpp"
+#include "mellin/spectral/matcher_config.hpp"
+
+namespace mellin {
+
+/// What a picture's features are kept for: to be `a` of a match takes filter and polar, to be `b` image and polar.
+enum class FeatureUse : std::uint8_t { as_a, as_b, both };
+
+/// A picture as the matcher needs it, over the caller's memory. Kept between matches as long as the caller likes; may
+/// be copied with its memory. Empty spans are left out by extract().
+struct Features {
+  Span<float> image;     ///< seamless picture, side * side
+  Span<Complex> filter;  ///< whitened spectrum times low-pass, spectrum_size(side)
+  Span<Complex> polar;   ///< what the rotation is found by, see RotationEstimator; polar_count(config)
+  float floor = 0.0F;    ///< what is added to magnitudes when a turned copy is whitened
+  bool ready = false;    ///< extract() has succeeded
+
+  static constexpr std::size_t image_count(std::uint16_t side) { return std::size_t{side} * side; }
+  static constexpr std::size_t filter_count(std::uint16_t side) { return spectrum_size(side); }
+  static constexpr std::size_t polar_count(const MatcherConfig& config) {
+    return std::size_t{config.side} / 2U * (std::size_t{config.side} / 2U + 1U);
+  }
+
+  template <class A>
+  static constexpr Features carve(A& arena, const MatcherConfig& config, FeatureUse use = FeatureUse::both,
+                                  Part part = Part::spectral) {
+    Features f;
+    if (use != FeatureUse::as_a) {
+      f.image = arena.template take<float>(image_count(config.side), part);
+    }
+    if (use != FeatureUse::as_b) {
+      f.filter = arena.template take<Complex>(filter_count(config.side), part);
+    }
+    f.polar = arena.template take<Complex>(polar_count(config), part);
+    return f;
+  }
+};
+
+}  // namespace mellin
