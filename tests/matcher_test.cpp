@@ -3,6 +3,7 @@
 #include <doctest.h>
 
 #include <cmath>
+#include <cstring>
 #include <initializer_list>
 #include <utility>
 #include <vector>
@@ -42,7 +43,7 @@ class Bench {
   }
   Features extract(const Picture& picture, FeatureUse use = FeatureUse::both) {
     Features features = carve(use);
-    REQUIRE(matcher.extract({picture.data(), picture.size()}, features) == Status::ok);
+    REQUIRE(matcher.extract({picture.data(), picture.size()}, {}, features) == Status::ok);
     return features;
   }
   HypothesisList match(const Picture& a, const Picture& b) {
@@ -351,7 +352,7 @@ TEST_SUITE("matcher") {
     const Picture picture = golden_picture(golden::kPictureA);
     CHECK(bench.matcher.step());
     Features features = bench.carve();
-    REQUIRE(bench.matcher.begin_extract({picture.data(), picture.size()}, features) == Status::ok);
+    REQUIRE(bench.matcher.begin_extract({picture.data(), picture.size()}, {}, features) == Status::ok);
     int steps = 1;
     while (!bench.matcher.step()) {
       CHECK_FALSE(features.ready);
@@ -384,13 +385,49 @@ TEST_SUITE("matcher") {
     CHECK(bench.matcher.hypotheses().empty());
   }
 
+  TEST_CASE("observed free space counts against obstacles, the unobserved not at all") {
+    MatcherConfig config = config_of(48);
+    config.free_weight = 0.5F;
+    Bench bench(config);
+    Picture picture = golden_picture(golden::kPictureA);
+    picture[20 * 48 + 20] = 255;
+    picture[20 * 48 + 21] = 51;
+    picture[20 * 48 + 22] = 0;
+    std::vector<std::uint8_t> observed(mask_bytes(48), 0xFF);
+    observed[(30 * 48 + 16) / 8] = 0;
+    picture[30 * 48 + 16] = 51;
+    Features features = bench.carve();
+    REQUIRE(bench.matcher.extract({picture.data(), picture.size()}, {observed.data(), observed.size()}, features) ==
+            Status::ok);
+    CHECK(features.image[20 * 48 + 20] == doctest::Approx(1.0));
+    CHECK(features.image[20 * 48 + 21] == doctest::Approx(0.2 - 0.5 * 0.8));
+    CHECK(features.image[20 * 48 + 22] == doctest::Approx(-0.5));
+    CHECK(features.image[30 * 48 + 16] == doctest::Approx(0.2));
+
+    // Without a mask, or with no weight, it is the paper's picture: free and unobserved are the same.
+    const Features paper = bench.extract(picture);
+    CHECK(paper.image[20 * 48 + 22] == 0.0F);
+    config.free_weight = 0.0F;
+    Bench weightless(config);
+    Features same = weightless.carve();
+    REQUIRE(weightless.matcher.extract({picture.data(), picture.size()}, {observed.data(), observed.size()}, same) ==
+            Status::ok);
+    CHECK(std::equal(same.image.begin(), same.image.end(), paper.image.begin()));
+    CHECK(std::memcmp(same.filter.data(), paper.filter.data(), same.filter.size() * sizeof(Complex)) == 0);
+
+    // Free space without an obstacle is no structure, whatever its outline.
+    const Picture flat(48 * 48, 0);
+    CHECK(bench.matcher.extract({flat.data(), flat.size()}, {observed.data(), observed.size()}, features) ==
+          Status::degenerate);
+  }
+
   TEST_CASE("pictures without structure are degenerate and match nothing") {
     Bench bench(config_of(48));
     const Features good = bench.extract(golden_picture(golden::kPictureA));
     for (const std::uint8_t value : std::initializer_list<std::uint8_t>{0, 1, 128, 255}) {
       const Picture flat(48 * 48, value);
       Features features = bench.carve();
-      CHECK(bench.matcher.extract({flat.data(), flat.size()}, features) == Status::degenerate);
+      CHECK(bench.matcher.extract({flat.data(), flat.size()}, {}, features) == Status::degenerate);
       CHECK_FALSE(features.ready);
       CHECK(bench.matcher.match(good, features) == Status::degenerate);
       CHECK(bench.matcher.hypotheses().empty());
@@ -399,7 +436,7 @@ TEST_SUITE("matcher") {
     // A flat picture written into features that were ready takes their readiness away.
     Features reused = good;
     const Picture flat(48 * 48, 0);
-    CHECK(bench.matcher.extract({flat.data(), flat.size()}, reused) == Status::degenerate);
+    CHECK(bench.matcher.extract({flat.data(), flat.size()}, {}, reused) == Status::degenerate);
     CHECK_FALSE(reused.ready);
   }
 
@@ -431,8 +468,8 @@ TEST_SUITE("matcher") {
       for (const Picture& b : pictures) {
         Features fa = bench.carve();
         Features fb = bench.carve();
-        const Status extracted_a = bench.matcher.extract({a.data(), a.size()}, fa);
-        const Status extracted_b = bench.matcher.extract({b.data(), b.size()}, fb);
+        const Status extracted_a = bench.matcher.extract({a.data(), a.size()}, {}, fa);
+        const Status extracted_b = bench.matcher.extract({b.data(), b.size()}, {}, fb);
         const Status matched = bench.matcher.match(fa, fb);
         CHECK((matched == Status::ok) == (extracted_a == Status::ok && extracted_b == Status::ok));
         CHECK(all_finite(bench.matcher.hypotheses()));
@@ -465,7 +502,7 @@ TEST_SUITE("matcher") {
       CAPTURE(variant);
       MatcherConfig config = config_of(96, 0.4F);
       config.lowpass_sigma = variant == 0 ? 0.0F : 0.25F;
-      config.high_pass = variant != 1;
+      config.high_pass = variant == 1 ? HighPass::none : HighPass::radius;
       config.com_radius = static_cast<std::uint8_t>(variant == 2 ? 0 : (variant == 3 ? 3 : 1));
       Bench bench(config);
       const Pose2 a_T_b{1.7, -2.2, 2.5};

@@ -76,7 +76,8 @@ Features SpectralScreening::cached_features(std::uint32_t index) const {
 }
 
 void SpectralScreening::begin_features(std::uint32_t index, Features& out, Stage stage) {
-  stage_ = matcher_.begin_extract(digest_out(index).obstacles, out) == Status::ok ? stage : Stage::idle;
+  const DigestOut digest = digest_out(index);
+  stage_ = matcher_.begin_extract(digest.obstacles, digest.observed, out) == Status::ok ? stage : Stage::idle;
 }
 
 void SpectralScreening::begin_caching(std::uint32_t index) {

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mellin/grid/digest.hpp"
 #include "mellin/spectral/matcher.hpp"
 
 namespace mellin {
@@ -20,6 +21,7 @@ ImageView Matcher::picture_image() const {
   return {as_floats(memory_.second).first(Features::image_count(config_.side)), config_.side};
 }
 
+/// Obstacles count 1, observed free space -free_weight, what lies between in between, the unobserved 0.
 void Matcher::load_rows(std::size_t first, std::size_t count) {
   const ImageView image = picture_image();
   const std::size_t end = (first + count) * image.side;
@@ -28,6 +30,14 @@ void Matcher::load_rows(std::size_t first, std::size_t count) {
     lowest_ = std::min(lowest_, value);
     highest_ = std::max(highest_, value);
     image.pixels[i] = static_cast<float>(value) / 255.0F;
+  }
+  if (observed_.empty() || !(config_.free_weight > 0.0F)) {
+    return;
+  }
+  for (std::size_t i = first * image.side; i < end; ++i) {
+    if (mask_bit(observed_, i)) {
+      image.pixels[i] -= config_.free_weight * (1.0F - image.pixels[i]);
+    }
   }
 }
 

@@ -27,7 +27,9 @@ std::size_t Matcher::rotation_count() const {
 void Matcher::transform_turned_rows(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
   const SinCos turn = sincos(rotation_.peaks()[rotation_index_].angle_rad);
-  const SinCosF turn_f{static_cast<float>(turn.sin), static_cast<float>(turn.cos)};
+  // A picture enlarged by s is read at coordinates smaller by s.
+  const double scale = static_cast<double>(rotation_.peaks()[rotation_index_].scale);
+  const SinCosF turn_f{static_cast<float>(turn.sin / scale), static_cast<float>(turn.cos / scale)};
   const ImageView image{b_.image, config_.side};
   for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
     const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
@@ -87,31 +89,25 @@ void Matcher::search_surface_rows(std::size_t first, std::size_t count) {
   }
 }
 
-/// Centre of mass round the highest value (Eq. 3) and the pose that it means.
+/// The highest value's place, refined, and the pose that it means.
 void Matcher::locate_peak() {
-  if (!(best_ > 0.0F)) {
+  if (!(best_ > 0.0F) || best_ < config_.min_peak) {
     return;
   }
   const std::size_t side = config_.side;
-  const int radius = config_.com_radius;
-  float mass = 0.0F;
-  float moment_x = 0.0F;
-  float moment_y = 0.0F;
+  const int radius = PeakWindow::radius_for(config_);
+  PeakWindow window;
   for (int dy = -radius; dy <= radius; ++dy) {
     float* const row = memory_.rows.data();
     fft_.inverse_rows(surface(), cyclic(best_row_, dy, side), 1, row);
-    for (int dx = -radius; dx <= radius; ++dx) {
-      const float value = std::max(row[cyclic(best_column_, dx, side)], 0.0F);
-      mass += value;
-      moment_x += value * static_cast<float>(dx);
-      moment_y += value * static_cast<float>(dy);
-    }
+    window.set_row(dy, {row, side}, best_column_, radius);
   }
+  const PeakOffset offset = peak_offset(window, radius, config_);
   // Turning pixel centres 0 … side - 1 by 180 degrees about their middle maps i to side - 1 - i, whereas the conjugate
   // spectrum stands for -i: a shift of side - 1 is to be taken off.
   const double mirrored = half_turn_ ? static_cast<double>(side - 1) : 0.0;
-  const double x = static_cast<double>(best_column_) + static_cast<double>(moment_x / mass) - mirrored;
-  const double y = static_cast<double>(best_row_) + static_cast<double>(moment_y / mass) - mirrored;
+  const double x = static_cast<double>(best_column_) + offset.x - mirrored;
+  const double y = static_cast<double>(best_row_) + offset.y - mirrored;
   const auto pixel_m = static_cast<double>(config_.pixel_m);
   const RotationPeak& rotation = rotation_.peaks()[rotation_index_];
   Hypothesis hypothesis;
@@ -119,6 +115,7 @@ void Matcher::locate_peak() {
                       wrap_angle(rotation.angle_rad + (half_turn_ ? kPi : 0.0))};
   hypothesis.peak = best_;
   hypothesis.rotation_peak = rotation.strength;
+  hypothesis.scale = rotation.scale;
   add_hypothesis(hypothesis);
 }
 

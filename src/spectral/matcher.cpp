@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cassert>
 
+#include "mellin/grid/digest.hpp"
+
 namespace mellin {
 
 namespace {
@@ -44,7 +46,7 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
   }
   const Status tabulated = rotation_.init(
       config, memory.rotation,
-      {as_floats(memory.second).first(spectrum_size(config.side)), memory.rows.first(side), memory.lines});
+      {as_floats(memory.second).first(spectrum_size(config.side)), memory.rows, memory.lines, memory.first});
   if (tabulated != Status::ok) {
     return tabulated;
   }
@@ -60,15 +62,17 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
   return Status::ok;
 }
 
-Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out) {
-  const bool valid = fft_.side() > 0 && picture.size() == Features::image_count(config_.side) && fits(out, config_);
+Status Matcher::begin_extract(Span<const std::uint8_t> obstacles, Span<const std::uint8_t> observed, Features& out) {
+  const bool valid = fft_.side() > 0 && obstacles.size() == Features::image_count(config_.side) &&
+                     (observed.empty() || observed.size() == mask_bytes(config_.side)) && fits(out, config_);
   assert(valid);
   stage_ = Stage::idle;
   out.ready = false;
   if (!valid) {
     return status_ = Status::invalid_argument;
   }
-  picture_ = picture;
+  picture_ = obstacles;
+  observed_ = observed;
   out_ = &out;
   lowest_ = 255;
   highest_ = 0;
@@ -219,8 +223,8 @@ Matcher::Stage Matcher::after(Stage stage) {
   return Stage::idle;
 }
 
-Status Matcher::extract(Span<const std::uint8_t> picture, Features& out) {
-  const Status begun = begin_extract(picture, out);
+Status Matcher::extract(Span<const std::uint8_t> obstacles, Span<const std::uint8_t> observed, Features& out) {
+  const Status begun = begin_extract(obstacles, observed, out);
   while (!step()) {
   }
   return begun == Status::ok ? status_ : begun;

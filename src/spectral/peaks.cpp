@@ -2,9 +2,43 @@
 
 #include <algorithm>
 
+#include "mellin/core/math.hpp"
 #include "mellin/spectral/fft2.hpp"
 
 namespace mellin {
+
+namespace {
+
+/// Eq. 3; values under 0 are taken for 0. The middle is over 0.
+PeakOffset centre_of_mass(const PeakWindow& window, int rows, int columns) {
+  float mass = 0.0F;
+  float moment_x = 0.0F;
+  float moment_y = 0.0F;
+  for (int dy = -rows; dy <= rows; ++dy) {
+    for (int dx = -columns; dx <= columns; ++dx) {
+      const float value = std::max(window.at(dx, dy), 0.0F);
+      mass += value;
+      moment_x += value * static_cast<float>(dx);
+      moment_y += value * static_cast<float>(dy);
+    }
+  }
+  return {static_cast<double>(moment_x / mass), static_cast<double>(moment_y / mass)};
+}
+
+bool can_fit_gaussian(float before, float middle, float behind) {
+  return before > 0.0F && behind > 0.0F && middle > 0.0F && middle >= before && middle >= behind &&
+         (middle > before || middle > behind);
+}
+
+/// A Gaussian's logarithm is a parabola: its vertex, from the middle, within half a pixel of it.
+double gaussian_vertex(float before, float middle, float behind) {
+  const double left = log(static_cast<double>(before));
+  const double centre = log(static_cast<double>(middle));
+  const double right = log(static_cast<double>(behind));
+  return 0.5 * (left - right) / (left - 2.0 * centre + right);
+}
+
+}  // namespace
 
 bool is_peak(Span<const float> line, std::size_t i) {
   constexpr std::size_t kNeighbours = 2;
@@ -36,6 +70,22 @@ float highest(const float* values, std::size_t count) {
     result = std::max(result, lane);
   }
   return result;
+}
+
+PeakOffset peak_offset(const PeakWindow& window, int rows, const MatcherConfig& config) {
+  if (config.peak_fit == PeakFit::centre_of_mass) {
+    const int radius = config.com_radius;
+    return centre_of_mass(window, std::min(rows, radius), radius);
+  }
+  PeakOffset offset = centre_of_mass(window, std::min(rows, 1), 1);
+  const float middle = window.at(0, 0);
+  if (can_fit_gaussian(window.at(-1, 0), middle, window.at(1, 0))) {
+    offset.x = gaussian_vertex(window.at(-1, 0), middle, window.at(1, 0));
+  }
+  if (rows > 0 && can_fit_gaussian(window.at(0, -1), middle, window.at(0, 1))) {
+    offset.y = gaussian_vertex(window.at(0, -1), middle, window.at(0, 1));
+  }
+  return offset;
 }
 
 }  // namespace mellin

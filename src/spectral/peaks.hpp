@@ -1,9 +1,10 @@
-// Peaks of cyclic correlations: where they are, and how high.
+// Peaks of cyclic correlations: where they are, between the pixels, too, and how high.
 #pragma once
 
 #include <cstddef>
 
 #include "mellin/core/span.hpp"
+#include "mellin/spectral/matcher_config.hpp"
 
 namespace mellin {
 
@@ -17,5 +18,40 @@ bool is_peak(Span<const float> line, std::size_t i);
 
 /// The highest of `count` values, or 0 where none is over it.
 float highest(const float* values, std::size_t count);
+
+/// The correlation round a peak: a square, or one row of it.
+class PeakWindow {
+ public:
+  static constexpr int kMaxRadius = 3;
+
+  /// What is read for a fit of `config`: enough for its curvature, too.
+  static int radius_for(const MatcherConfig& config) {
+    return config.peak_fit == PeakFit::gaussian || config.com_radius == 0 ? 1 : config.com_radius;
+  }
+
+  /// Row dy of the window from a cyclic row of the correlation, column `column` in the middle.
+  void set_row(int dy, Span<const float> row, std::size_t column, int radius) {
+    for (int dx = -radius; dx <= radius; ++dx) {
+      at(dx, dy) = row[cyclic(column, dx, row.size())];
+    }
+  }
+  float& at(int dx, int dy) { return values_[index(dx, dy)]; }
+  float at(int dx, int dy) const { return values_[index(dx, dy)]; }
+
+ private:
+  static constexpr std::size_t index(int dx, int dy) {
+    return static_cast<std::size_t>((dy + kMaxRadius) * (2 * kMaxRadius + 1) + dx + kMaxRadius);
+  }
+  float values_[std::size_t{(2 * kMaxRadius + 1) * (2 * kMaxRadius + 1)}] = {};
+};
+
+/// From the highest pixel to the peak, pixels.
+struct PeakOffset {
+  double x = 0.0;
+  double y = 0.0;
+};
+
+/// By config.peak_fit and com_radius. `rows`: radius of the window along y, 0 for a single row.
+PeakOffset peak_offset(const PeakWindow& window, int rows, const MatcherConfig& config);
 
 }  // namespace mellin

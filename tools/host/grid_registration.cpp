@@ -200,10 +200,12 @@ class Pair {
     std::vector<std::uint8_t> picture(count);
     std::vector<float> scratch(DigestMaker::scratch_size(sides_.cells, sides_.pixels));
     DigestOut out;
+    std::vector<std::uint8_t> observed(mask_bytes(sides_.pixels));
     out.obstacles = {picture.data(), count};
+    out.observed = {observed.data(), observed.size()};
     out.side = sides_.pixels;
     require(make_digest(grid.view(), {scratch.data(), scratch.size()}, out), "picture of the grid");
-    const Status status = matcher.extract({picture.data(), count}, features);
+    const Status status = matcher.extract({picture.data(), count}, {observed.data(), observed.size()}, features);
     if (status != Status::degenerate) {
       require(status, "features of the grid");
     }
@@ -291,7 +293,7 @@ std::vector<GridHypothesis> register_grids(const OccupancyImage& a, const Occupa
   for (const Candidate& c : candidates) {
     const Pose2 a_T_b = compose(compose(inverse(pair.a().centre_T_corner), c.a_T_b), pair.b().centre_T_corner);
     const double confidence = confidence_of(c.agreement, c.inlier_share, margin_of(c, candidates), c.peak);
-    hypotheses.push_back({a_T_b, confidence, c.peak, c.agreement});
+    hypotheses.push_back({a_T_b, confidence, c.peak, c.agreement, c.inlier_share, 0.0, margin_of(c, candidates)});
   }
   std::stable_sort(hypotheses.begin(), hypotheses.end(),
                    [](const GridHypothesis& x, const GridHypothesis& y) { return x.confidence > y.confidence; });

@@ -16,6 +16,9 @@ struct GridHypothesis {
   double confidence = 0.0;  ///< 0 to 1; see confidence_of()
   double peak = 0.0;        ///< of the phase-only matched filter
   double agreement = 0.0;   ///< Agreement::score after alignment
+  double inlier_share = 0.0;
+  double overlap = 0.0;
+  double margin = 0.0;
 };
 
 /// Hypotheses from this confidence on are a match.

@@ -82,11 +82,13 @@ void visit_settings(C& c, Visit&& visit) {
   visit("submaps.band_rows", c.submaps.band_rows);
   visit("screening.peak_share", c.screening.matcher.peak_share);
   visit("screening.max_peaks", c.screening.matcher.max_peaks);
+  visit("screening.free_weight", c.screening.matcher.free_weight);
   visit("screening.verified", c.screening.verified);
   visit("screening.cache_features", c.screening.cache_features);
   visit("screening.hold_digests", c.screening.hold_digests);
   visit("registration.peak_share", c.registration.matcher.peak_share);
   visit("registration.max_peaks", c.registration.matcher.max_peaks);
+  visit("registration.free_weight", c.registration.matcher.free_weight);
   visit("registration.aligned", c.registration.aligned);
   visit("registration.aligned_share", c.registration.aligned_share);
   visit("registration.aligned_from", c.registration.aligned_from);

@@ -56,6 +56,7 @@ class SpectralRegistration final : public GridMatcher {
     m.features_a = Features::carve(work, config.matcher, FeatureUse::as_a);
     m.features_b = Features::carve(work, config.matcher, FeatureUse::as_b);
     m.picture.obstacles = work.template take<std::uint8_t>(std::size_t{side} * side, Part::spectral);
+    m.picture.observed = work.template take<std::uint8_t>(mask_bytes(side), Part::spectral);
     m.picture.side = side;
     m.classes_a = work.template take<std::uint8_t>(classes, Part::spectral);
     m.classes_b = work.template take<std::uint8_t>(classes, Part::spectral);

@@ -49,6 +49,13 @@ struct DigestOut {
 /// A cell with less than this (a quarter of the observations were hits) counts as free.
 inline constexpr std::uint8_t kFreeBelow = 64;
 
+/// What is done to obstacles, thin as lasers see them, before a picture is halved or matched (paper, Section IV-B2).
+enum class Preprocessing : std::uint8_t {
+  none,
+  erosion,  ///< of free space: obstacles grow by a cell, thicken() in image.hpp
+  blur      ///< Gaussian, standard deviation one cell, blur() in image.hpp
+};
+
 /// Makes a digest, or the picture that the matcher registers, from a submap's grid: obstacles are thickened by a cell,
 /// the picture halved and normalised, again and again until it has the wanted side (paper, Sections IV-B2 and V-A). At
 /// the grid's own side they are thickened and normalised.

@@ -26,7 +26,8 @@ struct Features {
   static constexpr std::size_t image_count(std::uint16_t side) { return std::size_t{side} * side; }
   static constexpr std::size_t filter_count(std::uint16_t side) { return spectrum_size(side); }
   static constexpr std::size_t polar_count(const MatcherConfig& config) {
-    return std::size_t{config.side} / 2U * (std::size_t{config.side} / 2U + 1U);
+    return config.rotation == RotationMode::rings ? std::size_t{config.side} / 2U * (config.side / 2U + 1U)
+                                                  : spectrum_size(config.side);
   }
 
   template <class A>

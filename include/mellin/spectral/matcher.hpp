@@ -30,7 +30,8 @@ namespace mellin {
 struct Hypothesis {
   Pose2 a_T_b;                 ///< pose of b's frame in a's, m and rad, theta in [-pi, pi)
   float peak = 0.0F;           ///< of the phase-only filter: 1 for equal pictures, near 0 for unrelated ones
-  float rotation_peak = 0.0F;  ///< correlation coefficient of the rings at this rotation, -1 … 1
+  float rotation_peak = 0.0F;  ///< of the correlation that gave the rotation: 1 for equal pictures, over 0
+  float scale = 1.0F;          ///< b enlarged by it about its origin, then moved by a_T_b, looks like a
 };
 
 /// Best first.
@@ -77,9 +78,10 @@ class Matcher {
   Status init(const MatcherConfig& config, const Memory& memory);
   const MatcherConfig& config() const { return config_; }
 
-  /// Starts making the features of `picture` (side * side bytes) in `out`; both must live until the job is done. An
-  /// unfinished earlier job is given up. invalid_argument: sizes do not hold.
-  Status begin_extract(Span<const std::uint8_t> picture, Features& out);
+  /// Starts making the features of a picture in `out`: its obstacles (side * side bytes) and the mask of what was
+  /// observed (mask_bytes(side), see digest.hpp; may be empty: nothing is known to be free then). All must live until
+  /// the job is done. An unfinished earlier job is given up. invalid_argument: sizes do not hold.
+  Status begin_extract(Span<const std::uint8_t> obstacles, Span<const std::uint8_t> observed, Features& out);
   /// Starts matching; the memory of both must live and stay until the job is done, and they may be the same. An
   /// unfinished earlier job is given up. invalid_argument: sizes do not hold, or a has no filter, or b no image.
   /// degenerate: one of them is not ready; there are no hypotheses then.
@@ -95,7 +97,7 @@ class Matcher {
   const HypothesisList& hypotheses() const { return hypotheses_; }
 
   /// begin_extract() and all its steps. Status of both.
-  Status extract(Span<const std::uint8_t> picture, Features& out);
+  Status extract(Span<const std::uint8_t> obstacles, Span<const std::uint8_t> observed, Features& out);
   /// begin_match() and all its steps. Status of both; see hypotheses().
   Status match(const Features& a, const Features& b, const MatchOptions& options = {});
 
@@ -151,7 +153,8 @@ class Matcher {
   std::size_t line_ = 0;  // next line of the stage
   Status status_ = Status::ok;
 
-  Span<const std::uint8_t> picture_;
+  Span<const std::uint8_t> picture_;  // obstacles …
+  Span<const std::uint8_t> observed_;
   Features* out_ = nullptr;
   std::uint8_t lowest_ = 0;  // of the picture's bytes
   std::uint8_t highest_ = 0;

@@ -1,9 +1,15 @@
-// The rotation between two pictures, from the magnitudes of their spectra (paper, Section IV-A step 2).
+// The rotation between two pictures, and their scale, from the magnitudes of their spectra (paper, Section IV-A step
+// 2).
 //
-// The magnitude of a picture's spectrum does not depend on where the picture lies and turns with it. Resampled along
-// half circles ("rings"; the other half is the same), a rotation becomes a cyclic shift of each ring, found by
-// correlating all rings at once. Submaps have one scale, so scale is held at 1 and rings are spaced evenly, not
-// logarithmically. Each peak stands for two rotations, beta and beta + 180 degrees.
+// The magnitude of a picture's spectrum does not depend on where the picture lies and turns with it; the half plane
+// that a real picture's spectrum stores is all of it. Resampled to polar coordinates, angles along the rows, a rotation
+// becomes a cyclic shift along the angle, and with logarithmic radii a scale becomes a shift along the radius. The
+// shift is found by a correlation. Each peak stands for two rotations, beta and beta + 180 degrees.
+//
+// RotationMode says what is correlated. Rings: each row by itself, as a correlation coefficient, summed over the rows.
+// The others: the polar picture as a whole by a phase-only matched filter. Submaps have one scale, so all modes but the
+// paper's own look at no shift along the radius: that row of the surface is one inverse transform of the cross spectrum
+// summed over the radial frequencies.
 //
 // A stage of the Matcher, which lends it scratch memory and its transforms.
 #pragma once
@@ -23,7 +29,8 @@ namespace mellin {
 
 struct RotationPeak {
   double angle_rad = 0.0;  ///< b turned by it, or by it and 180 degrees, looks like a; about 0 … 180 degrees
-  float strength = 0.0F;   ///< correlation coefficient of the rings, over 0 up to 1
+  float strength = 0.0F;   ///< of the correlation: 1 for equal pictures, over 0
+  float scale = 1.0F;      ///< b enlarged by it looks like a; 1 where the mode holds it
 };
 
 /// Strongest first.
@@ -33,22 +40,24 @@ class RotationEstimator {
  public:
   struct Memory {
     Span<Complex> directions;  ///< cosine and sine of each angle
-    Span<float> correlation;   ///< over the angles
+    Span<float> correlation;   ///< over the angles; the best of all scales
+    Span<std::uint16_t> rows;  ///< of the correlation surface where that was, for RotationMode::log_polar_scale
   };
   /// Whose contents only have to stay while a job runs.
   struct Scratch {
     Span<float> magnitudes;  ///< spectrum_size(side), while features are made
-    Span<float> row;         ///< side
+    Span<float> rows;        ///< Fft2::kBlock rows
     Span<Complex> line;      ///< side / 2 + 1, while two are compared
+    Span<Complex> surface;   ///< spectrum_size(side), while two are compared
   };
 
   /// Tables from `tables`, where they stay; what is needed only while a job runs from `work`.
   template <class A, class W>
   static constexpr Memory carve(A& tables, W& work, const MatcherConfig& config) {
-    const std::size_t side = config.side;
     Memory m;
-    m.directions = tables.template take<Complex>(side, Part::spectral);
-    m.correlation = work.template take<float>(side, Part::spectral);
+    m.directions = tables.template take<Complex>(angles(config), Part::spectral);
+    m.correlation = work.template take<float>(config.side, Part::spectral);
+    m.rows = work.template take<std::uint16_t>(seeks_scale(config) ? angles(config) : 0, Part::spectral);
     return m;
   }
 
@@ -63,7 +72,7 @@ class RotationEstimator {
   /// Starts looking for the rotations from b's to a's, both made by begin_describe(), that reach `least` strength.
   void begin_estimate(Span<const Complex> a, Span<const Complex> b, float least);
   /// Does one pass, or up to `lines` lines of it if that is not 0. True when the job is done. `fft` is of the side.
-  bool step(const Fft2& fft, std::size_t lines);
+  bool step(Fft2& fft, std::size_t lines);
 
   /// Of the last begin_describe(). degenerate: the magnitudes do not depend on the angle.
   Status status() const { return status_; }
@@ -71,16 +80,35 @@ class RotationEstimator {
   const RotationPeakList& peaks() const { return peaks_; }
 
  private:
-  enum class Stage : std::uint8_t { idle, sample, scale, correlate, find };
+  enum class Stage : std::uint8_t { idle, sample, transform, scale, correlate, search, find };
 
+  static constexpr bool seeks_scale(const MatcherConfig& config) {
+    return config.rotation == RotationMode::log_polar_scale;
+  }
+  static constexpr bool is_log_polar(const MatcherConfig& config) {
+    return config.rotation == RotationMode::log_polar || seeks_scale(config);
+  }
+  /// Angles over 180 degrees, the period of magnitudes.
+  static constexpr std::size_t angles(const MatcherConfig& config) {
+    return is_log_polar(config) ? config.side / 2U : config.side;
+  }
+  bool by_rings() const { return config_.rotation == RotationMode::rings; }
   std::size_t lines_of(Stage stage) const;
-  void run(const Fft2& fft, std::size_t first, std::size_t count);
+  void run(Fft2& fft, std::size_t first, std::size_t count);
   Stage after(Stage stage);
+  void weigh_by_reddy(std::size_t kx, float* magnitudes);
+  float radius(std::size_t row) const;
   void sample_rings(const Fft2& fft, std::size_t first, std::size_t count);
   void scale_rings(std::size_t first, std::size_t count);
   void correlate_rings(std::size_t first, std::size_t count);
-  void find_peaks(const Fft2& fft);
-  double peak_position(std::size_t i) const;
+  void sample_polar(Fft2& fft, std::size_t first, std::size_t count);
+  void transform_polar(Fft2& fft, std::size_t first, std::size_t count);
+  void whiten_polar(std::size_t first, std::size_t count);
+  void correlate_polar(std::size_t first, std::size_t count);
+  void correlate_scales(Fft2& fft, std::size_t first, std::size_t count);
+  void search_scales(Fft2& fft, std::size_t first, std::size_t count);
+  void find_peaks(Fft2& fft);
+  RotationPeak refined(Fft2& fft, std::size_t angle) const;
 
   MatcherConfig config_;
   Memory memory_;
@@ -89,7 +117,7 @@ class RotationEstimator {
   std::size_t line_ = 0;  // next line of the stage
   Status status_ = Status::ok;
   Span<Complex> out_;
-  double energy_ = 0.0;  // of the rings
+  double sum_ = 0.0;  // of the rings' energy, or of the polar spectrum's magnitudes
   Span<const Complex> a_;
   Span<const Complex> b_;
   float least_ = 0.0F;
