@@ -77,16 +77,32 @@ void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
   }
 }
 
+void Matcher::begin_surface() {
+  peak_ = {};
+  peaks_.begin(config_.side, config_.translation_peaks);
+}
+
 /// The correlation surface is looked at as it comes, a block of rows at a time, and never stored.
 void Matcher::search_surface_rows(std::size_t first, std::size_t count) {
   for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
-    fft_.inverse_rows_search(surface(), r, std::min(Fft2::kBlock, first + count - r), peak_);
+    const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
+    if (config_.translation_peaks == 1) {
+      fft_.inverse_rows_search(surface(), r, rows, peak_);
+      continue;
+    }
+    fft_.inverse_rows(surface(), r, rows, memory_.rows.data());
+    for (std::size_t i = 0; i < rows; ++i) {
+      peaks_.add_row(r + i, memory_.rows.subspan(i * config_.side, config_.side));
+    }
+  }
+  if (config_.translation_peaks == 1 && first + count == config_.side && peak_.value > 0.0F) {
+    peaks_.add(peak_);
   }
 }
 
-/// The highest value's place, refined, and the pose that it means.
-void Matcher::locate_peak() {
-  if (!(peak_.value > 0.0F) || peak_.value < config_.min_peak) {
+/// A peak's place, refined, and the pose that it means.
+void Matcher::locate_peak(const Fft2::Peak& peak) {
+  if (peak.value < config_.min_peak) {
     return;
   }
   const std::size_t side = config_.side;
@@ -94,21 +110,21 @@ void Matcher::locate_peak() {
   PeakWindow window;
   for (int dy = -radius; dy <= radius; ++dy) {
     float* const row = memory_.rows.data();
-    fft_.inverse_rows(surface(), cyclic(peak_.row, dy, side), 1, row);
-    window.set_row(dy, {row, side}, peak_.column, radius);
+    fft_.inverse_rows(surface(), cyclic(peak.row, dy, side), 1, row);
+    window.set_row(dy, {row, side}, peak.column, radius);
   }
   const PeakOffset offset = peak_offset(window, radius, config_);
   // Turning pixel centres 0 … side - 1 by 180 degrees about their middle maps i to side - 1 - i, whereas the conjugate
   // spectrum stands for -i: a shift of side - 1 is to be taken off.
   const double mirrored = half_turn_ ? static_cast<double>(side - 1) : 0.0;
-  const double x = static_cast<double>(peak_.column) + offset.x - mirrored;
-  const double y = static_cast<double>(peak_.row) + offset.y - mirrored;
+  const double x = static_cast<double>(peak.column) + offset.x - mirrored;
+  const double y = static_cast<double>(peak.row) + offset.y - mirrored;
   const auto pixel_m = static_cast<double>(config_.pixel_m);
   const RotationPeak& rotation = rotation_.peaks()[rotation_index_];
   Hypothesis hypothesis;
   hypothesis.a_T_b = {nearest_shift(x, side) * pixel_m, nearest_shift(y, side) * pixel_m,
                       wrap_angle(rotation.angle_rad + (half_turn_ ? kPi : 0.0))};
-  hypothesis.peak = peak_.value;
+  hypothesis.peak = peak.value;
   hypothesis.rotation_peak = rotation.strength;
   hypothesis.scale = rotation.scale;
   add_hypothesis(hypothesis);
@@ -126,13 +142,7 @@ void Matcher::add_hypothesis(const Hypothesis& hypothesis) {
       if (hypotheses_[i].peak >= hypothesis.peak) {
         return;
       }
-      HypothesisList others;
-      for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
-        if (k != i) {
-          others.insert(others.size(), hypotheses_[k]);
-        }
-      }
-      hypotheses_ = others;
+      hypotheses_.erase(i);
       break;
     }
   }

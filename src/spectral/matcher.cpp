@@ -142,9 +142,10 @@ std::size_t Matcher::lines_of(Stage stage) const {
       return side / 2 + 1;
     case Stage::filter_columns:
       return side / 2;
+    case Stage::locate_peak:
+      return peaks_.size();
     case Stage::describe_rotation:
     case Stage::estimate_rotation:
-    case Stage::locate_peak:
     case Stage::idle:
       break;
   }
@@ -172,7 +173,10 @@ void Matcher::run(Stage stage, std::size_t first, std::size_t count) {
     case Stage::surface_rows:
       return search_surface_rows(first, count);
     case Stage::locate_peak:
-      return locate_peak();
+      for (std::size_t i = first; i < first + count; ++i) {
+        locate_peak(peaks_[i]);
+      }
+      return;
     case Stage::describe_rotation:
     case Stage::estimate_rotation:
     case Stage::idle:
@@ -212,14 +216,14 @@ Matcher::Stage Matcher::after(Stage stage) {
       return Stage::filter_columns;
     case Stage::filter_columns:
       half_turn_ = false;
-      peak_ = {};
+      begin_surface();
       return Stage::surface_rows;
     case Stage::surface_rows:
       return Stage::locate_peak;
     case Stage::locate_peak:
       if (!half_turn_) {
         half_turn_ = true;
-        peak_ = {};
+        begin_surface();
         return Stage::surface_rows;
       }
       return ++rotation_index_ == rotation_count() ? Stage::idle : Stage::turned_rows;

@@ -23,6 +23,7 @@
 #include "mellin/spectral/fft2.hpp"
 #include "mellin/spectral/matcher_config.hpp"
 #include "mellin/spectral/rotation.hpp"
+#include "mellin/spectral/surface_peaks.hpp"
 
 namespace mellin {
 
@@ -34,8 +35,10 @@ struct Hypothesis {
   float scale = 1.0F;          ///< b enlarged by it about its origin, then moved by a_T_b, looks like a
 };
 
+/// Of one match; the lowest peaks drop out.
+inline constexpr std::size_t kMaxMatchHypotheses = 32;
 /// Best first.
-using HypothesisList = FixedList<Hypothesis, 2 * kMaxRotationPeaks>;
+using HypothesisList = FixedList<Hypothesis, kMaxMatchHypotheses>;
 
 /// What may differ from match to match.
 struct MatchOptions {
@@ -137,8 +140,9 @@ class Matcher {
   void transform_turned_rows(std::size_t first, std::size_t count);
   void whiten_turned_columns(std::size_t first, std::size_t count);
   void filter_turned_columns(std::size_t first, std::size_t count);
+  void begin_surface();
   void search_surface_rows(std::size_t first, std::size_t count);
-  void locate_peak();
+  void locate_peak(const Fft2::Peak& peak);
   /// Rotation peaks that are tried.
   std::size_t rotation_count() const;
   void add_hypothesis(const Hypothesis& hypothesis);
@@ -169,7 +173,8 @@ class Matcher {
   RotationEstimator rotation_;
   std::size_t rotation_index_ = 0;  // of its peaks, the one under way
   bool half_turn_ = false;          // looking at beta + 180 degrees
-  Fft2::Peak peak_;                 // of the correlation surface so far
+  SurfacePeaks peaks_;              // of the correlation surface so far
+  Fft2::Peak peak_;                 // the highest, where only that is asked for
   HypothesisList hypotheses_;
 };
 

@@ -10,6 +10,7 @@
 namespace mellin {
 
 inline constexpr std::size_t kMaxRotationPeaks = 6;
+inline constexpr std::size_t kMaxTranslationPeaks = 8;
 
 /// How the rotation is found from the magnitudes of the pictures' spectra (paper, Section IV-A step 2).
 enum class RotationMode : std::uint8_t {
@@ -47,6 +48,9 @@ struct MatcherConfig {
   /// At most so many rotation peaks are tried, strongest first (IV-B3): 1 … 6. Time is in proportion; each gives two
   /// hypotheses.
   std::uint8_t max_peaks = 6;
+  /// At most so many translation peaks of each turned picture become hypotheses, highest first: 1 … 8. The paper takes
+  /// one; more are worth it where what was observed is then asked which is right.
+  std::uint8_t translation_peaks = 1;
   /// Radius of the neighbourhood whose centre of mass is the peak's position (Eq. 3, CoM_r): 0 … 3 pixels.
   std::uint8_t com_radius = 1;
   /// Edge of a pixel, m: gives the hypotheses their unit.
@@ -83,11 +87,12 @@ struct MatcherConfig {
 constexpr bool is_valid(const MatcherConfig& config) {
   return is_fft_side(config.side) && config.pixel_m > 0.0F && config.pixel_m < 1e3F && config.peak_share >= 0.0F &&
          config.peak_share <= 1.0F && config.max_peaks >= 1 && config.max_peaks <= kMaxRotationPeaks &&
-         config.com_radius <= 3 && config.lowpass_sigma >= 0.0F && config.lowpass_sigma < 1e3F &&
-         config.whitening_floor > 0.0F && config.whitening_floor <= 1.0F && config.edge_margin > 0.0F &&
-         config.edge_margin <= 0.1F && config.rotation <= RotationMode::log_polar_scale &&
-         config.high_pass <= HighPass::reddy && config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F &&
-         config.min_peak <= 1.0F && config.free_weight >= 0.0F && config.free_weight <= 4.0F;
+         config.translation_peaks >= 1 && config.translation_peaks <= kMaxTranslationPeaks && config.com_radius <= 3 &&
+         config.lowpass_sigma >= 0.0F && config.lowpass_sigma < 1e3F && config.whitening_floor > 0.0F &&
+         config.whitening_floor <= 1.0F && config.edge_margin > 0.0F && config.edge_margin <= 0.1F &&
+         config.rotation <= RotationMode::log_polar_scale && config.high_pass <= HighPass::reddy &&
+         config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F && config.min_peak <= 1.0F &&
+         config.free_weight >= 0.0F && config.free_weight <= 4.0F;
 }
 
 /// The paper taken at its word: phase-only matched filters without low-pass for rotation with scale and for
