@@ -22,12 +22,12 @@ using Picture = std::vector<std::uint8_t>;
 /// A matcher with memory for itself and as many features as are asked for.
 class Bench {
  public:
-  explicit Bench(const MatcherConfig& config) : config_(config) {
+  explicit Bench(const MatcherConfig& config, VectorUnit unit = best_vector_unit()) : config_(config) {
     MeasureArena measure;
     Matcher::carve(measure, config);
     memory_.resize(measure.use().total() / sizeof(double));
     Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(memory_.data()), measure.use().total()));
-    REQUIRE(matcher.init(config, Matcher::carve(arena, config)) == Status::ok);
+    REQUIRE(matcher.init(config, Matcher::carve(arena, config), unit) == Status::ok);
     REQUIRE(arena.ok());
     REQUIRE(arena.use().total() == measure.use().total());
   }
@@ -484,6 +484,50 @@ TEST_SUITE("matcher") {
     CHECK(identity);
   }
 
+  TEST_CASE("the query's kept turns, however many, and every vector unit give the same bits") {
+    MatcherConfig config = config_of(96, 0.4F);
+    config.turns_per_bin = 4;
+    std::vector<Picture> stored;
+    for (int i = 0; i < 6; ++i) {
+      stored.push_back(digest_of(render(office(1), {2.0 * i, -1.0 * i, 0.35 * i}, 384, 0.1, 17.0), 384, 96));
+    }
+    const Picture queries[] = {stored[2], digest_of(render(office(1), {1.0, 2.0, 0.3}, 384, 0.1, 17.0), 384, 96)};
+    const auto run = [&](std::uint16_t kept, VectorUnit unit) {
+      config.kept_turns = kept;
+      Bench bench(config, unit);
+      std::vector<Hypothesis> all;
+      std::vector<Features> features;
+      for (const Picture& picture : stored) {
+        features.push_back(bench.extract(picture));
+      }
+      Features query = bench.carve();
+      for (int pass = 0; pass < 2; ++pass) {  // the second query lies where the first did
+        const Picture& picture = queries[pass];
+        REQUIRE(bench.matcher.extract({picture.data(), picture.size()}, query) == Status::ok);
+        bench.matcher.keep_turned(query);
+        for (const Features& other : features) {
+          REQUIRE(bench.matcher.match(other, query) == Status::ok);
+          all.insert(all.end(), bench.matcher.hypotheses().begin(), bench.matcher.hypotheses().end());
+        }
+      }
+      return all;
+    };
+    const std::vector<Hypothesis> plain = run(0, VectorUnit::portable);
+    for (const std::uint16_t kept : std::initializer_list<std::uint16_t>{0, 1, 5, 384}) {
+      CAPTURE(kept);
+      const std::vector<Hypothesis> found = run(kept, best_vector_unit());
+      REQUIRE(found.size() == plain.size());
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        CHECK(found[i].a_T_b.x == plain[i].a_T_b.x);
+        CHECK(found[i].a_T_b.y == plain[i].a_T_b.y);
+        CHECK(found[i].a_T_b.theta == plain[i].a_T_b.theta);
+        CHECK(found[i].peak == plain[i].peak);
+        const double steps = plain[i].a_T_b.theta / (kPi / (96 * 4));
+        CHECK(std::fabs(steps - std::round(steps)) < 1e-6);
+      }
+    }
+  }
+
   TEST_CASE("hypotheses are sorted and distinct") {
     Bench bench(config_of(96, 0.4F));
     const HypothesisList found = bench.match(digest_of(render(office(3), {}, 384, 0.1, 17.0), 384, 96),
@@ -529,7 +573,13 @@ TEST_SUITE("matcher") {
                                    with([](auto& c) { c.com_radius = 4; }),
                                    with([](auto& c) { c.lowpass_sigma = -1.0F; }),
                                    with([](auto& c) { c.whitening_floor = 0.0F; }),
-                                   with([](auto& c) { c.edge_margin = NAN; })};
+                                   with([](auto& c) { c.edge_margin = NAN; }),
+                                   with([](auto& c) { c.turns_per_bin = 9; }),
+                                   with([](auto& c) { c.kept_turns = 1; }),
+                                   with([](auto& c) {
+                                     c.turns_per_bin = 2;
+                                     c.kept_turns = 2 * 96 + 1;
+                                   })};
     for (const MatcherConfig& config : wrong) {
       Matcher matcher;
       CHECK(matcher.init(config, {}) == Status::invalid_config);

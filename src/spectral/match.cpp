@@ -25,9 +25,51 @@ std::size_t Matcher::rotation_count() const {
   return std::min(rotation_.peaks().size(), most);
 }
 
+/// Multiple of the angular step nearest to the rotation under way; cyclic, since both it and the half turn beyond are
+/// looked at.
+std::uint32_t Matcher::turn_index() const {
+  const auto steps = static_cast<std::uint32_t>(config_.side * config_.turns_per_bin);
+  const double turns = rotation_.peaks()[rotation_index_].angle_rad / kPi;  // half turns
+  const double fraction = turns - floor(turns);
+  return static_cast<std::uint32_t>(fraction * static_cast<double>(steps) + 0.5) % steps;
+}
+
+double Matcher::turned_angle() const {
+  if (config_.turns_per_bin == 0) {
+    return rotation_.peaks()[rotation_index_].angle_rad;
+  }
+  return turn_index() * kPi / (static_cast<double>(config_.side) * config_.turns_per_bin);
+}
+
+/// Where b's spectrum at this rotation is known, it need not be made.
+Matcher::Stage Matcher::begin_rotation() {
+  turned_ = memory_.first;
+  const bool kept = b_.image.data() == query_ && rotation_.peaks()[rotation_index_].scale == 1.0F;
+  if (!kept) {
+    return Stage::turned_rows;
+  }
+  const std::size_t size = spectrum_size(config_.side);
+  const std::size_t place = memory_.turn_place[turn_index()];
+  if (place > 0) {
+    turned_ = memory_.turns.subspan((place - 1) * size, size);
+    return Stage::filter_columns;
+  }
+  if (turns_ < config_.kept_turns) {
+    turned_ = memory_.turns.subspan(turns_ * size, size);
+  }
+  return Stage::turned_rows;
+}
+
+/// The spectrum under way is done; it lies behind those that are kept already if it is to be kept.
+void Matcher::keep_turn() {
+  if (turned_.data() != memory_.first.data()) {
+    memory_.turn_place[turn_index()] = static_cast<std::uint16_t>(++turns_);
+  }
+}
+
 void Matcher::transform_turned_rows(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
-  const SinCos turn = sincos(rotation_.peaks()[rotation_index_].angle_rad);
+  const SinCos turn = sincos(turned_angle());
   // A picture enlarged by s is read at coordinates smaller by s.
   const double scale = static_cast<double>(rotation_.peaks()[rotation_index_].scale);
   const SinCosF turn_f{static_cast<float>(turn.sin / scale), static_cast<float>(turn.cos / scale)};
@@ -37,18 +79,17 @@ void Matcher::transform_turned_rows(std::size_t first, std::size_t count) {
     for (std::size_t i = 0; i < rows; ++i) {
       turned_row(image, turn_f, r + i, fft_.kernels(), memory_.rows.data() + i * side);
     }
-    fft_.forward_rows(memory_.rows.data(), r, rows, memory_.first);
+    fft_.forward_rows(memory_.rows.data(), r, rows, turned_);
   }
 }
 
 /// The phases of the turned picture, in place.
 void Matcher::whiten_turned_columns(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
-  const Span<Complex> turned = memory_.first;
   for (std::size_t kx = first; kx < first + count; kx += kFftLanes) {
     const std::size_t columns = std::min(kFftLanes, first + count - kx);
-    fft_.forward_columns(turned, kx, columns);
-    fft_.kernels().whiten(turned.data() + kx * side, columns * side, b_.floor);
+    fft_.forward_columns(turned_, kx, columns);
+    fft_.kernels().whiten(turned_.data() + kx * side, columns * side, b_.floor);
   }
 }
 
@@ -58,7 +99,7 @@ void Matcher::whiten_turned_columns(std::size_t first, std::size_t count) {
 void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
   const std::size_t last = side / 2;
-  const Complex* const turned = memory_.first.data();
+  const Complex* const turned = turned_.data();
   const Complex* const filter = a_.filter.data();
   Complex* const straight = memory_.lines.data();
   Complex* const straight_last = straight + kFftLanes * side;
@@ -123,7 +164,7 @@ void Matcher::locate_peak(const Fft2::Peak& peak) {
   const RotationPeak& rotation = rotation_.peaks()[rotation_index_];
   Hypothesis hypothesis;
   hypothesis.a_T_b = {nearest_shift(x, side) * pixel_m, nearest_shift(y, side) * pixel_m,
-                      wrap_angle(rotation.angle_rad + (half_turn_ ? kPi : 0.0))};
+                      wrap_angle(turned_angle() + (half_turn_ ? kPi : 0.0))};
   hypothesis.peak = peak.value;
   hypothesis.rotation_peak = rotation.strength;
   hypothesis.scale = rotation.scale;

@@ -36,7 +36,8 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUn
   const std::size_t side = config.side;
   const bool enough = memory.first.size() == spectrum_size(config.side) &&
                       memory.second.size() == memory.first.size() && memory.rows.size() == Fft2::kBlock * side &&
-                      memory.lines.size() == 2 * (kFftLanes + 1) * side && memory.lowpass.size() == side;
+                      memory.lines.size() == 2 * (kFftLanes + 1) * side && memory.lowpass.size() == side &&
+                      memory.turns.size() == config.kept_turns * spectrum_size(config.side);
   if (!enough) {
     return Status::insufficient_memory;
   }
@@ -52,6 +53,7 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUn
   }
   config_ = config;
   memory_ = memory;
+  query_ = nullptr;
   margin_ = EdgeBlur::margin(config.side, config.edge_margin);
   fill_lowpass(config.lowpass_sigma, memory.lowpass);
   double sum = 0.0;
@@ -68,6 +70,9 @@ Status Matcher::begin_extract(Span<const std::uint8_t> obstacles, Span<const std
   assert(valid);
   stage_ = Stage::idle;
   out.ready = false;
+  if (out.image.data() == query_) {
+    query_ = nullptr;
+  }
   if (!valid) {
     return status_ = Status::invalid_argument;
   }
@@ -102,6 +107,13 @@ Status Matcher::begin_match(const Features& a, const Features& b, const MatchOpt
   stage_ = Stage::estimate_rotation;
   line_ = 0;
   return Status::ok;
+}
+
+void Matcher::keep_turned(const Features& b) {
+  stage_ = Stage::idle;
+  query_ = memory_.turns.empty() ? nullptr : b.image.data();
+  turns_ = 0;
+  std::fill(memory_.turn_place.begin(), memory_.turn_place.end(), std::uint16_t{0});
 }
 
 bool Matcher::step() {
@@ -209,10 +221,11 @@ Matcher::Stage Matcher::after(Stage stage) {
       return Stage::idle;
     case Stage::estimate_rotation:
       rotation_index_ = 0;
-      return rotation_count() == 0 ? Stage::idle : Stage::turned_rows;
+      return rotation_count() == 0 ? Stage::idle : begin_rotation();
     case Stage::turned_rows:
       return Stage::turned_columns;
     case Stage::turned_columns:
+      keep_turn();
       return Stage::filter_columns;
     case Stage::filter_columns:
       half_turn_ = false;
@@ -226,7 +239,7 @@ Matcher::Stage Matcher::after(Stage stage) {
         begin_surface();
         return Stage::surface_rows;
       }
-      return ++rotation_index_ == rotation_count() ? Stage::idle : Stage::turned_rows;
+      return ++rotation_index_ == rotation_count() ? Stage::idle : begin_rotation();
     case Stage::idle:
       break;
   }

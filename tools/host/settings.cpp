@@ -83,6 +83,8 @@ void visit_settings(C& c, Visit&& visit) {
   visit("screening.peak_share", c.screening.matcher.peak_share);
   visit("screening.max_peaks", c.screening.matcher.max_peaks);
   visit("screening.free_weight", c.screening.matcher.free_weight);
+  visit("screening.turns_per_bin", c.screening.matcher.turns_per_bin);
+  visit("screening.kept_turns", c.screening.matcher.kept_turns);
   visit("screening.verified", c.screening.verified);
   visit("screening.cache_features", c.screening.cache_features);
   visit("screening.hold_digests", c.screening.hold_digests);

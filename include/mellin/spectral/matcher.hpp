@@ -56,6 +56,8 @@ class Matcher {
     Span<Complex> lines;   ///< twice kFftLanes columns of a spectrum and one more
     Span<float> lowpass;   ///< along one axis
     RotationEstimator::Memory rotation;
+    Span<Complex> turns;             ///< spectra of the query, turned and whitened, MatcherConfig::kept_turns of them
+    Span<std::uint16_t> turn_place;  ///< of each angle: where in `turns`, from 1 on; 0: not there
   };
 
   template <class A>
@@ -74,6 +76,9 @@ class Matcher {
     m.lines = work.template take<Complex>(2 * (kFftLanes + 1) * side, Part::spectral, Region::fast);
     m.lowpass = tables.template take<float>(side, Part::spectral, Region::fast);
     m.rotation = RotationEstimator::carve(tables, work, config);
+    m.turns = work.template take<Complex>(config.kept_turns * spectrum_size(config.side), Part::spectral);
+    m.turn_place =
+        work.template take<std::uint16_t>(config.kept_turns > 0 ? side * config.turns_per_bin : 0, Part::spectral);
     return m;
   }
 
@@ -90,6 +95,10 @@ class Matcher {
   /// unfinished earlier job is given up. invalid_argument: sizes do not hold, or a has no filter, or b no image.
   /// degenerate: one of them is not ready; there are no hypotheses then.
   Status begin_match(const Features& a, const Features& b, const MatchOptions& options = {});
+
+  /// Names the query: from now on matches with `b`, told by where its image lies, keep its turned spectra for the next
+  /// one, until b is extracted anew or another query is named. Only where MatcherConfig::kept_turns is not 0.
+  void keep_turned(const Features& b);
 
   /// Does one pass, or lines_per_step lines of it, of the job. True when the job is done, or there is none.
   /// Costliest pass: the filtered columns of a turned picture, two FFTs a column.
@@ -137,6 +146,10 @@ class Matcher {
   void transform_picture_columns(std::size_t first, std::size_t count);
   void end_magnitudes();
   void whiten_columns(std::size_t first, std::size_t count);
+  Stage begin_rotation();
+  std::uint32_t turn_index() const;
+  double turned_angle() const;
+  void keep_turn();
   void transform_turned_rows(std::size_t first, std::size_t count);
   void whiten_turned_columns(std::size_t first, std::size_t count);
   void filter_turned_columns(std::size_t first, std::size_t count);
@@ -173,6 +186,9 @@ class Matcher {
   RotationEstimator rotation_;
   std::size_t rotation_index_ = 0;  // of its peaks, the one under way
   bool half_turn_ = false;          // looking at beta + 180 degrees
+  const float* query_ = nullptr;    // image of the picture whose turned spectra are kept
+  std::size_t turns_ = 0;           // that are kept so far
+  Span<Complex> turned_;            // b under way: turned, in the end whitened too
   SurfacePeaks peaks_;              // of the correlation surface so far
   Fft2::Peak peak_;                 // the highest, where only that is asked for
   HypothesisList hypotheses_;

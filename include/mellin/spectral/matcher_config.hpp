@@ -79,6 +79,13 @@ struct MatcherConfig {
   /// and the unknown says nothing. 0 is the paper's way, which takes unobserved space for free (IV-B1). Without an
   /// observed mask it has no effect. 0 … 4.
   float free_weight = 1.0F;
+  /// b is turned by multiples of an angular bin (180 degrees / side) over this, which is the angle that a hypothesis
+  /// says then: 1 … 8; 0: by the very angle of the peak.
+  std::uint8_t turns_per_bin = 0;
+  /// Turned spectra of one picture, the query, that are kept between matches (Matcher::keep_turned()), at most
+  /// side * turns_per_bin: a spectrum's memory each. More than one picture is compared with it at half the cost. Has no
+  /// influence on the results. Only with turns_per_bin.
+  std::uint16_t kept_turns = 0;
   /// Lines (rows, columns, rings) that one step() treats; 0 means a whole pass.
   std::uint16_t lines_per_step = 0;
 };
@@ -92,7 +99,8 @@ constexpr bool is_valid(const MatcherConfig& config) {
          config.whitening_floor <= 1.0F && config.edge_margin > 0.0F && config.edge_margin <= 0.1F &&
          config.rotation <= RotationMode::log_polar_scale && config.high_pass <= HighPass::reddy &&
          config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F && config.min_peak <= 1.0F &&
-         config.free_weight >= 0.0F && config.free_weight <= 4.0F;
+         config.free_weight >= 0.0F && config.free_weight <= 4.0F && config.turns_per_bin <= 8 &&
+         config.kept_turns <= config.side * config.turns_per_bin;
 }
 
 /// The paper taken at its word: phase-only matched filters without low-pass for rotation with scale and for
