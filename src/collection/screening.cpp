@@ -96,7 +96,7 @@ Status SpectralScreening::begin_describe(std::uint32_t index, const GridView& gr
   classified_b_ = kNone;
   described_ = index;
   restored_ = kNone;
-  const Status status = maker_.begin(grid, memory_.scratch, digest_out(index));
+  const Status status = maker_.begin(grid, memory_.scratch, digest_out(index), config_.matcher.preprocessing);
   stage_ = status == Status::ok ? Stage::digest : Stage::idle;
   return status;
 }

@@ -41,6 +41,15 @@ double Matcher::turned_angle() const {
   return turn_index() * kPi / (static_cast<double>(config_.side) * config_.turns_per_bin);
 }
 
+/// Of the angle that is turned by about the peak's, rad^2: within half a step it is uniform.
+float Matcher::turn_variance() const {
+  if (config_.turns_per_bin == 0) {
+    return 0.0F;
+  }
+  const double step_rad = kPi / (static_cast<double>(config_.side) * config_.turns_per_bin);
+  return static_cast<float>(step_rad * step_rad / 12.0);
+}
+
 /// Where b's spectrum at this rotation is known, it need not be made.
 Matcher::Stage Matcher::begin_rotation() {
   turned_ = memory_.first;
@@ -168,6 +177,12 @@ void Matcher::locate_peak(const Fft2::Peak& peak) {
   hypothesis.peak = peak.value;
   hypothesis.rotation_peak = rotation.strength;
   hypothesis.scale = rotation.scale;
+  const double quarter = 0.25 * static_cast<double>(side);
+  const PeakSpread spread = spread_by_gradient(curvature(window, radius), gradient_noise_, quarter);
+  const double fit = fit_variance(config_, PeakKind::whitened);
+  const double square_m = pixel_m * pixel_m;
+  hypothesis.covariance = {static_cast<float>((spread.xx + fit) * square_m), static_cast<float>(spread.xy * square_m),
+                           static_cast<float>((spread.yy + fit) * square_m), rotation.variance + turn_variance()};
   add_hypothesis(hypothesis);
 }
 

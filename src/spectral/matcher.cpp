@@ -56,12 +56,30 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUn
   query_ = nullptr;
   margin_ = EdgeBlur::margin(config.side, config.edge_margin);
   fill_lowpass(config.lowpass_sigma, memory.lowpass);
+  weigh_filter();
+  return Status::ok;
+}
+
+/// The sums over the low-pass that scale the surface to 1 for equal pictures, and tell its gradient's variance where
+/// all phases are random: (2 pi)^2 sum(fx^2 W^2) / sum(W)^2, W the product of the weights of both axes. Pictures differ
+/// by walls rather than by pixels, so fewer phases are independent: they grow with the side, not with its square
+/// (measured, tests/matcher_covariance_test.cpp).
+void Matcher::weigh_filter() {
+  constexpr double kIndependentLines = 64.0;
+  const std::size_t side = config_.side;
   double sum = 0.0;
-  for (const float weight : memory.lowpass) {
-    sum += static_cast<double>(weight);
+  double square_sum = 0.0;
+  double slope_sum = 0.0;
+  for (std::size_t i = 0; i < side; ++i) {
+    const auto weight = static_cast<double>(memory_.lowpass[i]);
+    const double radians = kTwoPi * static_cast<double>(std::min(i, side - i)) / static_cast<double>(side);
+    sum += weight;
+    square_sum += weight * weight;
+    slope_sum += weight * weight * radians * radians;
   }
   filter_scale_ = static_cast<float>(1.0 / (sum * sum));
-  return Status::ok;
+  const double lines = static_cast<double>(side) / kIndependentLines;
+  gradient_noise_ = std::max(1.0, lines) * slope_sum * square_sum / (sum * sum * sum * sum);
 }
 
 Status Matcher::begin_extract(Span<const std::uint8_t> obstacles, Span<const std::uint8_t> observed, Features& out) {

@@ -102,7 +102,7 @@ class SpectralScreening final : public DigestMatcher {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
   static constexpr std::size_t scratch_size(const ScreeningConfig& config) {
-    return DigestMaker::scratch_size(config.grid_side, config.matcher.side);
+    return DigestMaker::scratch_size(config.grid_side, config.matcher.side, config.matcher.preprocessing);
   }
   bool holds(std::uint32_t index) const;
   DigestOut digest_out(std::uint32_t index) const;

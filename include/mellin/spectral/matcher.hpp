@@ -27,12 +27,22 @@
 
 namespace mellin {
 
+/// Covariance of a registered pose from the shapes of its correlation peaks: x and y m^2, theta rad^2, theta taken for
+/// independent of the place.
+struct PeakCovariance {
+  float xx = 0.0F;
+  float xy = 0.0F;
+  float yy = 0.0F;
+  float tt = 0.0F;
+};
+
 /// Where b may lie in a.
 struct Hypothesis {
   Pose2 a_T_b;                 ///< pose of b's frame in a's, m and rad, theta in [-pi, pi)
   float peak = 0.0F;           ///< of the phase-only filter: 1 for equal pictures, near 0 for unrelated ones
   float rotation_peak = 0.0F;  ///< of the correlation that gave the rotation: 1 for equal pictures, over 0
   float scale = 1.0F;          ///< b enlarged by it about its origin, then moved by a_T_b, looks like a
+  PeakCovariance covariance;   ///< of a_T_b, from noise only: a wrong hypothesis may have a small one
 };
 
 /// Of one match; the lowest peaks drop out.
@@ -139,6 +149,7 @@ class Matcher {
   void run(Stage stage, std::size_t first, std::size_t count);
   Stage after(Stage stage);
 
+  void weigh_filter();
   ImageView picture_image() const;
   void load_rows(std::size_t first, std::size_t count);
   void blur_edges(std::size_t first, std::size_t count);
@@ -149,6 +160,7 @@ class Matcher {
   Stage begin_rotation();
   std::uint32_t turn_index() const;
   double turned_angle() const;
+  float turn_variance() const;
   void keep_turn();
   void transform_turned_rows(std::size_t first, std::size_t count);
   void whiten_turned_columns(std::size_t first, std::size_t count);
@@ -168,6 +180,7 @@ class Matcher {
   EdgeBlur edge_blur_;
   std::uint16_t margin_ = 0;
   float filter_scale_ = 1.0F;
+  double gradient_noise_ = 0.0;  // of a surface of random phases, along an axis, per pixel squared
 
   Stage stage_ = Stage::idle;
   std::size_t line_ = 0;  // next line of the stage

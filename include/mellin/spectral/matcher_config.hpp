@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "mellin/grid/digest.hpp"
 #include "mellin/spectral/fft2.hpp"
 
 namespace mellin {
@@ -66,6 +67,9 @@ struct MatcherConfig {
   /// Width of the margin that is blended into its cyclically blurred self (IV-A step 1), share of the side, over 0 up
   /// to 0.1.
   float edge_margin = 0.04F;
+  /// What makes the pictures of grids (IV-B2): for those who call DigestMaker; the matcher itself takes pictures as
+  /// they are.
+  Preprocessing preprocessing = Preprocessing::erosion;
   /// How the rotation is found (IV-A step 2). Costs of a comparison: rings least, log_polar_scale a 2D transform more.
   RotationMode rotation = RotationMode::rings;
   /// Weight of magnitudes before the rotation is sought (Fig. 1b).
@@ -97,10 +101,10 @@ constexpr bool is_valid(const MatcherConfig& config) {
          config.translation_peaks >= 1 && config.translation_peaks <= kMaxTranslationPeaks && config.com_radius <= 3 &&
          config.lowpass_sigma >= 0.0F && config.lowpass_sigma < 1e3F && config.whitening_floor > 0.0F &&
          config.whitening_floor <= 1.0F && config.edge_margin > 0.0F && config.edge_margin <= 0.1F &&
-         config.rotation <= RotationMode::log_polar_scale && config.high_pass <= HighPass::reddy &&
-         config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F && config.min_peak <= 1.0F &&
-         config.free_weight >= 0.0F && config.free_weight <= 4.0F && config.turns_per_bin <= 8 &&
-         config.kept_turns <= config.side * config.turns_per_bin;
+         config.preprocessing <= Preprocessing::blur && config.rotation <= RotationMode::log_polar_scale &&
+         config.high_pass <= HighPass::reddy && config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F &&
+         config.min_peak <= 1.0F && config.free_weight >= 0.0F && config.free_weight <= 4.0F &&
+         config.turns_per_bin <= 8 && config.kept_turns <= config.side * config.turns_per_bin;
 }
 
 /// The paper taken at its word: phase-only matched filters without low-pass for rotation with scale and for
