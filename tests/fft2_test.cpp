@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <cstring>
 #include <initializer_list>
 #include <vector>
 
@@ -17,7 +18,7 @@ using namespace mellin;
 extern "C" void* kiss_fft_alloc(int n, int inverse, void* memory, std::size_t* bytes);
 extern "C" void* kiss_fftr_alloc(int n, int inverse, void* memory, std::size_t* bytes);
 extern "C" void kiss_fft(void* plan, const void* in, void* out);
-#if MELLIN_FFT_LANES == 4
+#if MELLIN_FFT_LANES > 1
 extern "C" void* mellin_lanes_fft_alloc(int n, int inverse, void* memory, std::size_t* bytes);
 extern "C" void* mellin_lanes_fftr_alloc(int n, int inverse, void* memory, std::size_t* bytes);
 #endif
@@ -25,13 +26,13 @@ extern "C" void* mellin_lanes_fftr_alloc(int n, int inverse, void* memory, std::
 namespace {
 
 struct Transform {
-  explicit Transform(std::uint16_t side) {
+  explicit Transform(std::uint16_t side, VectorUnit unit = best_vector_unit()) {
     MeasureArena measure;
     Fft2::carve(measure, side);
     bytes = measure.use().total();
     memory.resize(bytes / sizeof(double));
     Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(memory.data()), bytes));
-    REQUIRE(fft.init(side, Fft2::carve(arena, side)) == Status::ok);
+    REQUIRE(fft.init(side, Fft2::carve(arena, side), unit) == Status::ok);
     REQUIRE(arena.ok());
     REQUIRE(arena.use().total() == bytes);
   }
@@ -85,7 +86,7 @@ TEST_SUITE("fft2") {
         bytes = 0;
         kiss_fftr_alloc(static_cast<int>(side), inverse, nullptr, &bytes);
         CHECK(bytes == real_plan_bytes(side));
-#if MELLIN_FFT_LANES == 4
+#if MELLIN_FFT_LANES > 1
         bytes = 0;
         mellin_lanes_fft_alloc(static_cast<int>(side), inverse, nullptr, &bytes);
         CHECK(bytes == complex_plan_bytes(side, kFftLanes));
@@ -176,7 +177,9 @@ TEST_SUITE("fft2") {
         for (std::size_t r = 0; r < count; ++r) {
           transform.fft.forward_line(image.data() + r * side, line.data());
           transform.fft.inverse_line(line.data(), back.data());
-          for (std::size_t k = 0; k < width; ++k) {
+          REQUIRE(spectrum[2 + r].re == line[0].re);
+          REQUIRE(spectrum[2 + r].im == line[width - 1].re);
+          for (std::size_t k = 1; k < width - 1; ++k) {
             REQUIRE(spectrum[k * side + 2 + r].re == line[k].re);
             REQUIRE(spectrum[k * side + 2 + r].im == line[k].im);
           }
@@ -188,13 +191,34 @@ TEST_SUITE("fft2") {
       }
       const std::vector<Complex> before = spectrum;
       transform.fft.forward_columns({spectrum.data(), spectrum.size()}, 0, width);
-      for (std::size_t kx = 0; kx < width; ++kx) {
+      for (std::size_t kx = 1; kx < width - 1; ++kx) {
         kiss_fft(plan.data(), before.data() + kx * side, line.data());
         for (std::size_t k = 0; k < side; ++k) {
           REQUIRE(spectrum[kx * side + k].re == line[k].re);
           REQUIRE(spectrum[kx * side + k].im == line[k].im);
         }
       }
+    }
+  }
+
+  TEST_CASE("every vector unit gives the same bits") {
+    for (const std::uint16_t side : std::initializer_list<std::uint16_t>{32, 50, 96, 162, 360}) {
+      CAPTURE(side);
+      Transform portable(side, VectorUnit::portable);
+      Transform widest(side, best_vector_unit());
+      const std::vector<float> image = noise(side);
+      std::vector<Complex> spectra[2] = {std::vector<Complex>(spectrum_size(side)),
+                                         std::vector<Complex>(spectrum_size(side))};
+      std::vector<float> images[2] = {std::vector<float>(image.size()), std::vector<float>(image.size())};
+      for (Transform* const transform : {&portable, &widest}) {
+        const std::size_t i = transform == &widest ? 1 : 0;
+        const Span<Complex> spectrum(spectra[i].data(), spectra[i].size());
+        REQUIRE(transform->fft.forward({image.data(), image.size()}, spectrum) == Status::ok);
+        std::vector<Complex> copy = spectra[i];
+        REQUIRE(transform->fft.inverse({copy.data(), copy.size()}, {images[i].data(), images[i].size()}) == Status::ok);
+      }
+      CHECK(std::memcmp(spectra[0].data(), spectra[1].data(), spectra[0].size() * sizeof(Complex)) == 0);
+      CHECK(std::memcmp(images[0].data(), images[1].data(), images[0].size() * sizeof(float)) == 0);
     }
   }
 

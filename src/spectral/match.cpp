@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "mellin/spectral/matcher.hpp"
+#include "spectral/kernels.hpp"
 #include "spectral/peaks.hpp"
 #include "spectral/resample.hpp"
 
@@ -34,64 +35,58 @@ void Matcher::transform_turned_rows(std::size_t first, std::size_t count) {
   for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
     const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
     for (std::size_t i = 0; i < rows; ++i) {
-      turned_row(image, turn_f, r + i, memory_.rows.data() + i * side);
+      turned_row(image, turn_f, r + i, fft_.kernels(), memory_.rows.data() + i * side);
     }
     fft_.forward_rows(memory_.rows.data(), r, rows, memory_.first);
   }
 }
 
-/// A few columns at a time through the fast memory: forward, whitened, multiplied with the filter of a, and back. The
-/// picture turned by a further 180 degrees has the conjugate spectrum (but for a shift, see locate_peak()), so both
-/// candidates come from one.
-void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
+/// The phases of the turned picture, in place.
+void Matcher::whiten_turned_columns(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
-  Complex* const turned = memory_.lines.data();
-  Complex* const straight = turned + kFftLanes * side;
-  Complex* const half_turned = straight + kFftLanes * side;
-  const float floor = b_.floor;
+  const Span<Complex> turned = memory_.first;
   for (std::size_t kx = first; kx < first + count; kx += kFftLanes) {
     const std::size_t columns = std::min(kFftLanes, first + count - kx);
-    Complex* const lines = memory_.first.data() + kx * side;
-    const Complex* const filter = a_.filter.data() + kx * side;
-    fft_.forward_lines(lines, columns, turned);
-    for (std::size_t i = 0; i < columns * side; ++i) {
-      const Complex z = turned[i];
-      const float weight = 1.0F / (std::sqrt(z.re * z.re + z.im * z.im) + floor);
-      const float re = weight * z.re;
-      const float im = weight * z.im;
-      const float rr = filter[i].re * re;
-      const float ii = filter[i].im * im;
-      const float ri = filter[i].re * im;
-      const float ir = filter[i].im * re;
-      straight[i] = {rr + ii, ir - ri};
-      half_turned[i] = {rr - ii, ir + ri};
+    fft_.forward_columns(turned, kx, columns);
+    fft_.kernels().whiten(turned.data() + kx * side, columns * side, b_.floor);
+  }
+}
+
+/// A few columns at a time through the fast memory: multiplied with the filter of a, and back. The picture turned by a
+/// further 180 degrees has the conjugate spectrum (but for a shift, see locate_peak()), so both candidates come from
+/// one.
+void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
+  const std::size_t side = config_.side;
+  const std::size_t last = side / 2;
+  const Complex* const turned = memory_.first.data();
+  const Complex* const filter = a_.filter.data();
+  Complex* const straight = memory_.lines.data();
+  Complex* const straight_last = straight + kFftLanes * side;
+  Complex* const half_turned = straight_last + side;
+  Complex* const half_turned_last = half_turned + kFftLanes * side;
+  const Kernels& kernels = fft_.kernels();
+  for (std::size_t kx = first; kx < first + count; kx += kFftLanes) {
+    const std::size_t columns = std::min(kFftLanes, first + count - kx);
+    const std::size_t at = kx * side;
+    kernels.cross(filter + at, turned + at, columns * side, straight, half_turned);
+    if (kx == 0) {
+      kernels.cross(filter + last * side, turned + last * side, side, straight_last, half_turned_last);
     }
-    fft_.inverse_lines(straight, columns, lines);
-    fft_.inverse_lines(half_turned, columns, memory_.second.data() + kx * side);
+    fft_.inverse_lines(straight, kx == 0 ? straight_last : nullptr, columns, memory_.first.data() + at);
+    fft_.inverse_lines(half_turned, kx == 0 ? half_turned_last : nullptr, columns, memory_.second.data() + at);
   }
 }
 
 /// The correlation surface is looked at as it comes, a block of rows at a time, and never stored.
 void Matcher::search_surface_rows(std::size_t first, std::size_t count) {
-  const std::size_t side = config_.side;
   for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
-    const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
-    fft_.inverse_rows(surface(), r, rows, memory_.rows.data());
-    for (std::size_t i = 0; i < rows; ++i) {
-      const float* const row = memory_.rows.data() + i * side;
-      const float top = highest(row, side);
-      if (top > best_) {
-        best_ = top;
-        best_row_ = r + i;
-        best_column_ = static_cast<std::size_t>(std::find(row, row + side, top) - row);
-      }
-    }
+    fft_.inverse_rows_search(surface(), r, std::min(Fft2::kBlock, first + count - r), peak_);
   }
 }
 
 /// The highest value's place, refined, and the pose that it means.
 void Matcher::locate_peak() {
-  if (!(best_ > 0.0F) || best_ < config_.min_peak) {
+  if (!(peak_.value > 0.0F) || peak_.value < config_.min_peak) {
     return;
   }
   const std::size_t side = config_.side;
@@ -99,21 +94,21 @@ void Matcher::locate_peak() {
   PeakWindow window;
   for (int dy = -radius; dy <= radius; ++dy) {
     float* const row = memory_.rows.data();
-    fft_.inverse_rows(surface(), cyclic(best_row_, dy, side), 1, row);
-    window.set_row(dy, {row, side}, best_column_, radius);
+    fft_.inverse_rows(surface(), cyclic(peak_.row, dy, side), 1, row);
+    window.set_row(dy, {row, side}, peak_.column, radius);
   }
   const PeakOffset offset = peak_offset(window, radius, config_);
   // Turning pixel centres 0 … side - 1 by 180 degrees about their middle maps i to side - 1 - i, whereas the conjugate
   // spectrum stands for -i: a shift of side - 1 is to be taken off.
   const double mirrored = half_turn_ ? static_cast<double>(side - 1) : 0.0;
-  const double x = static_cast<double>(best_column_) + offset.x - mirrored;
-  const double y = static_cast<double>(best_row_) + offset.y - mirrored;
+  const double x = static_cast<double>(peak_.column) + offset.x - mirrored;
+  const double y = static_cast<double>(peak_.row) + offset.y - mirrored;
   const auto pixel_m = static_cast<double>(config_.pixel_m);
   const RotationPeak& rotation = rotation_.peaks()[rotation_index_];
   Hypothesis hypothesis;
   hypothesis.a_T_b = {nearest_shift(x, side) * pixel_m, nearest_shift(y, side) * pixel_m,
                       wrap_angle(rotation.angle_rad + (half_turn_ ? kPi : 0.0))};
-  hypothesis.peak = best_;
+  hypothesis.peak = peak_.value;
   hypothesis.rotation_peak = rotation.strength;
   hypothesis.scale = rotation.scale;
   add_hypothesis(hypothesis);

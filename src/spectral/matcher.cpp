@@ -28,7 +28,7 @@ bool fits(const Features& features, const MatcherConfig& config) {
 
 }  // namespace
 
-Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
+Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUnit unit) {
   stage_ = Stage::idle;
   if (!is_valid(config)) {
     return Status::invalid_config;
@@ -36,11 +36,11 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory) {
   const std::size_t side = config.side;
   const bool enough = memory.first.size() == spectrum_size(config.side) &&
                       memory.second.size() == memory.first.size() && memory.rows.size() == Fft2::kBlock * side &&
-                      memory.lines.size() == 3 * kFftLanes * side && memory.lowpass.size() == side;
+                      memory.lines.size() == 2 * (kFftLanes + 1) * side && memory.lowpass.size() == side;
   if (!enough) {
     return Status::insufficient_memory;
   }
-  const Status planned = fft_.init(config.side, memory.fft);
+  const Status planned = fft_.init(config.side, memory.fft, unit);
   if (planned != Status::ok) {
     return planned;
   }
@@ -140,6 +140,8 @@ std::size_t Matcher::lines_of(Stage stage) const {
     case Stage::whiten:
     case Stage::turned_columns:
       return side / 2 + 1;
+    case Stage::filter_columns:
+      return side / 2;
     case Stage::describe_rotation:
     case Stage::estimate_rotation:
     case Stage::locate_peak:
@@ -164,6 +166,8 @@ void Matcher::run(Stage stage, std::size_t first, std::size_t count) {
     case Stage::turned_rows:
       return transform_turned_rows(first, count);
     case Stage::turned_columns:
+      return whiten_turned_columns(first, count);
+    case Stage::filter_columns:
       return filter_turned_columns(first, count);
     case Stage::surface_rows:
       return search_surface_rows(first, count);
@@ -205,15 +209,17 @@ Matcher::Stage Matcher::after(Stage stage) {
     case Stage::turned_rows:
       return Stage::turned_columns;
     case Stage::turned_columns:
+      return Stage::filter_columns;
+    case Stage::filter_columns:
       half_turn_ = false;
-      best_ = 0.0F;
+      peak_ = {};
       return Stage::surface_rows;
     case Stage::surface_rows:
       return Stage::locate_peak;
     case Stage::locate_peak:
       if (!half_turn_) {
         half_turn_ = true;
-        best_ = 0.0F;
+        peak_ = {};
         return Stage::surface_rows;
       }
       return ++rotation_index_ == rotation_count() ? Stage::idle : Stage::turned_rows;

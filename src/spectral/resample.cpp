@@ -50,7 +50,7 @@ float sample_near_border(const ImageView& image, float x, float y) {
 
 }  // namespace
 
-void turned_row(const ImageView& image, SinCosF turn, std::size_t row, float* out) {
+void turned_row(const ImageView& image, SinCosF turn, std::size_t row, const Kernels& kernels, float* out) {
   const int side = image.side;
   const float centre = 0.5F * static_cast<float>(side - 1);
   const float dy = static_cast<float>(row) - centre;
@@ -64,18 +64,8 @@ void turned_row(const ImageView& image, SinCosF turn, std::size_t row, float* ou
   for (; end > begin && !from.inside(end - 1); --end) {
     out[end - 1] = sample_near_border(image, from.x(end - 1), from.y(end - 1));
   }
-  const float* const pixels = image.pixels.data();
-  for (std::size_t c = begin; c < end; ++c) {
-    const float x = from.x(c);
-    const float y = from.y(c);
-    const int column = static_cast<int>(x);
-    const int line = static_cast<int>(y);
-    const float share_x = x - static_cast<float>(column);
-    const float share_y = y - static_cast<float>(line);
-    const float* const lower = pixels + ((line - 1) * side + column - 1);
-    const float* const upper = lower + side;
-    out[c] = mix(mix(lower[0], lower[1], share_x), mix(upper[0], upper[1], share_x), share_y);
-  }
+  kernels.turned_run({image.pixels.data(), side, from.x_of_centre, from.y_of_centre, from.cos, from.sin, centre}, begin,
+                     end, out);
 }
 
 void sample_ring(Span<const float> magnitudes, std::size_t side, float radius, Span<const Complex> directions,

@@ -50,7 +50,7 @@ class Matcher {
     Span<Complex> first;   ///< a spectrum
     Span<Complex> second;  ///< a spectrum; scratch memory of extract()
     Span<float> rows;      ///< Fft2::kBlock rows of an image
-    Span<Complex> lines;   ///< three times kFftLanes columns of a spectrum
+    Span<Complex> lines;   ///< twice kFftLanes columns of a spectrum and one more
     Span<float> lowpass;   ///< along one axis
     RotationEstimator::Memory rotation;
   };
@@ -68,14 +68,15 @@ class Matcher {
     m.first = work.template take<Complex>(spectrum_size(config.side), Part::spectral);
     m.second = work.template take<Complex>(spectrum_size(config.side), Part::spectral);
     m.rows = work.template take<float>(Fft2::kBlock * side, Part::spectral, Region::fast);
-    m.lines = work.template take<Complex>(3 * kFftLanes * side, Part::spectral, Region::fast);
+    m.lines = work.template take<Complex>(2 * (kFftLanes + 1) * side, Part::spectral, Region::fast);
     m.lowpass = tables.template take<float>(side, Part::spectral, Region::fast);
     m.rotation = RotationEstimator::carve(tables, work, config);
     return m;
   }
 
   /// Plans and tables. invalid_config: not is_valid(config). insufficient_memory: `memory` was carved for another side.
-  Status init(const MatcherConfig& config, const Memory& memory);
+  /// The results do not depend on `unit`; the processor must have it.
+  Status init(const MatcherConfig& config, const Memory& memory, VectorUnit unit = best_vector_unit());
   const MatcherConfig& config() const { return config_; }
 
   /// Starts making the features of a picture in `out`: its obstacles (side * side bytes) and the mask of what was
@@ -88,7 +89,7 @@ class Matcher {
   Status begin_match(const Features& a, const Features& b, const MatchOptions& options = {});
 
   /// Does one pass, or lines_per_step lines of it, of the job. True when the job is done, or there is none.
-  /// Costliest pass: the columns of a turned picture, three FFTs a column.
+  /// Costliest pass: the filtered columns of a turned picture, two FFTs a column.
   bool step();
   /// How the last job ended, once step() has returned true. ok; degenerate: the picture of an extract() has no
   /// structure to match by (all free, all unknown, all one value), its features stay not ready.
@@ -113,6 +114,7 @@ class Matcher {
     estimate_rotation,
     turned_rows,
     turned_columns,
+    filter_columns,
     surface_rows,
     locate_peak
   };
@@ -133,6 +135,7 @@ class Matcher {
   void end_magnitudes();
   void whiten_columns(std::size_t first, std::size_t count);
   void transform_turned_rows(std::size_t first, std::size_t count);
+  void whiten_turned_columns(std::size_t first, std::size_t count);
   void filter_turned_columns(std::size_t first, std::size_t count);
   void search_surface_rows(std::size_t first, std::size_t count);
   void locate_peak();
@@ -166,9 +169,7 @@ class Matcher {
   RotationEstimator rotation_;
   std::size_t rotation_index_ = 0;  // of its peaks, the one under way
   bool half_turn_ = false;          // looking at beta + 180 degrees
-  float best_ = 0.0F;               // highest value of the correlation surface so far, and where
-  std::size_t best_row_ = 0;
-  std::size_t best_column_ = 0;
+  Fft2::Peak peak_;                 // of the correlation surface so far
   HypothesisList hypotheses_;
 };
 
