@@ -1,11 +1,14 @@
 #include "program/eval_data.hpp"
 
+#include <unistd.h>
+
 #include <cstdio>
 #include <filesystem>
 #include <stdexcept>
 
 #include "host/carmen_log.hpp"
 #include "host/file.hpp"
+#include "host/table.hpp"
 #include "host/tum.hpp"
 
 namespace mellin::program {
@@ -41,6 +44,7 @@ void add_eval_options(CLI::App& command, EvalOptions& o) {
   command.add_option("--particles", o.particles, "of the mapping run")
       ->check(CLI::Range(1, 1000))
       ->capture_default_str();
+  command.add_flag("--progress", o.progress, "shows progress though standard error is no terminal");
   command.add_option("--threads", o.threads, "threads; results do not depend on it")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
@@ -100,24 +104,93 @@ host::SubmapFrames frames_named(const std::string& name) {
   return name == "aligned" ? host::SubmapFrames::aligned : host::SubmapFrames::random;
 }
 
-Preprocessing preprocessing_named(const std::string& name) {
-  return name == "none" ? Preprocessing::none : name == "blur" ? Preprocessing::blur : Preprocessing::erosion;
-}
-
 host::PairScore score_named(const std::string& name) {
   return name == "agreement" ? host::PairScore::agreement : host::PairScore::peak;
 }
 
-MatcherConfig matcher_named(const std::string& method, std::uint16_t side, std::uint8_t com_radius,
-                            const std::string& preprocessing) {
+MatcherConfig EvalCurve::matcher() const {
   MatcherConfig config;
   if (method == "paper") {
-    config = paper_matcher(side);
+    config = paper_matcher(side());
   }
-  config.side = side;
-  config.com_radius = com_radius;
+  config.side = side();
+  config.com_radius = static_cast<std::uint8_t>(com);
   (void)preprocessing;
   return config;
+}
+
+std::vector<std::string> EvalCurve::cells() const {
+  return {std::to_string(scans), host::fixed(scale, 2), std::to_string(com), preprocessing, method};
+}
+
+std::vector<std::string> curve_columns() { return {"scans", "scale", "com", "preprocessing", "method"}; }
+
+std::string EvalCurve::key() const {
+  std::string out;
+  for (const std::string& cell : cells()) {
+    out += out.empty() ? "" : " ";
+    out += cell;
+  }
+  return out;
+}
+
+std::vector<EvalCurve> EvalChoice::combinations() const {
+  const auto or_else = [](auto given, auto usual) {
+    if (given.empty()) {
+      given.push_back(usual);
+    }
+    return given;
+  };
+  std::vector<EvalCurve> out;
+  for (const std::uint16_t k : or_else(scans, std::uint16_t{40})) {
+    for (const double scale : or_else(scales, 25.0)) {
+      for (const std::string& method : methods) {
+        for (const std::string& prepared : or_else(preprocessing, std::string("erosion"))) {
+          for (const int radius : or_else(com, 1)) {
+            out.push_back({k, scale, radius, prepared, method});
+          }
+        }
+      }
+    }
+  }
+  return out;
+}
+
+void add_choice_options(CLI::App& command, EvalChoice& choice) {
+  command.add_option("--method", choice.methods, "matchers: best, paper")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"best", "paper"}))
+      ->default_str("best,paper");
+  const std::string combined = "every combination instead of the figures: ";
+  command.add_option("--scales", choice.scales, combined + "per cent of 768 pixels")
+      ->delimiter(',')
+      ->check(CLI::IsMember({100.0, 50.0, 25.0, 12.5, 6.25}));
+  command.add_option("--scans", choice.scans, combined + "scans a submap")->delimiter(',')->check(CLI::Range(4, 400));
+  command.add_option("--com", choice.com, combined + "radius of the peak's centre of mass")
+      ->delimiter(',')
+      ->check(CLI::Range(0, 3));
+  command.add_option("--preprocessing", choice.preprocessing, combined + "none, erosion, blur")
+      ->delimiter(',')
+      ->check(CLI::IsMember({"none", "erosion", "blur"}));
+}
+
+EvalFigure figure_of(const EvalChoice& choice, const std::string& title) {
+  EvalFigure figure{"chosen", title, {}};
+  for (const EvalCurve& curve : choice.combinations()) {
+    const std::string panel = std::to_string(curve.scans) + " scans, " + host::fixed(curve.scale, 2) + " %";
+    if (figure.panels.empty() || figure.panels.back().title != panel) {
+      figure.panels.push_back({panel, {}});
+    }
+    figure.panels.back().curves.push_back(
+        {curve.method + ", " + curve.preprocessing + ", CoM" + std::to_string(curve.com), curve});
+  }
+  return figure;
+}
+
+void show_progress(const EvalOptions& options, const std::string& line) {
+  if (options.progress || isatty(STDERR_FILENO) != 0) {
+    std::fprintf(stderr, "%s\n", line.c_str());
+  }
 }
 
 std::vector<host::PlotPoint> thinned(const std::vector<host::PlotPoint>& points, std::size_t count) {

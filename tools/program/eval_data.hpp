@@ -24,9 +24,10 @@ struct EvalOptions {
   std::uint64_t seed = 1;
   std::uint16_t particles = 1;
   std::size_t threads = 1;
+  bool progress = false;
 };
 
-/// LOG…, --truth, -o, --frames, --pairs, --full, --together, --seed, --particles, --threads.
+/// LOG…, --truth, -o, --frames, --pairs, --full, --together, --seed, --particles, --threads, --progress.
 void add_eval_options(CLI::App& command, EvalOptions& options);
 
 /// One building: a log, or several together.
@@ -64,13 +65,60 @@ inline constexpr std::uint16_t kSampledFromSide = 384;
 std::vector<host::EvalPair> chosen_pairs(const std::vector<host::EvalPair>& pairs, const EvalOptions& options,
                                          std::uint16_t side);
 
-host::SubmapFrames frames_named(const std::string& name);
-Preprocessing preprocessing_named(const std::string& name);
-host::PairScore score_named(const std::string& name);
+/// What one curve is measured with.
+struct EvalCurve {
+  std::uint16_t scans = 40;
+  double scale = 100.0;  ///< per cent of the submap's pixels
+  int com = 1;           ///< radius of the peak's centre of mass
+  std::string preprocessing = "erosion";
+  std::string method = "best";
 
-/// The matcher called `best` or `paper` with that side, rounding and preprocessing.
-MatcherConfig matcher_named(const std::string& method, std::uint16_t side, std::uint8_t com_radius,
-                            const std::string& preprocessing);
+  std::uint16_t side() const { return static_cast<std::uint16_t>(kFullSide * scale / 100.0); }
+  MatcherConfig matcher() const;
+  /// As cells of a table, under curve_columns().
+  std::vector<std::string> cells() const;
+  std::string key() const;
+
+  static constexpr double kFullSide = 768.0;
+};
+std::vector<std::string> curve_columns();
+
+/// Combinations asked for on the command line instead of the paper's figures.
+struct EvalChoice {
+  std::vector<std::string> methods{"best", "paper"};
+  std::vector<double> scales;
+  std::vector<std::uint16_t> scans;
+  std::vector<int> com;
+  std::vector<std::string> preprocessing;
+
+  bool any() const { return !scales.empty() || !scans.empty() || !com.empty() || !preprocessing.empty(); }
+  /// Every combination; what was left open is 40 scans, 25 %, CoM1, erosion.
+  std::vector<EvalCurve> combinations() const;
+};
+/// --method, --scales, --scans, --com, --preprocessing.
+void add_choice_options(CLI::App& command, EvalChoice& choice);
+
+/// Curves drawn into one panel, with their labels.
+struct EvalPanel {
+  std::string title;
+  std::vector<std::pair<std::string, EvalCurve>> curves;
+};
+struct EvalFigure {
+  std::string name;
+  std::string title;
+  std::vector<EvalPanel> panels;
+};
+/// A panel for each number of scans and scale.
+EvalFigure figure_of(const EvalChoice& choice, const std::string& title);
+
+/// Scans a submap that the paper compares.
+inline constexpr std::uint16_t kContexts[] = {20, 40, 80};
+
+/// A line on standard error, where progress is shown.
+void show_progress(const EvalOptions& options, const std::string& line);
+
+host::SubmapFrames frames_named(const std::string& name);
+host::PairScore score_named(const std::string& name);
 
 /// At most so many points of a curve for a picture, evenly spread, the first and the last among them.
 std::vector<host::PlotPoint> thinned(const std::vector<host::PlotPoint>& points, std::size_t count = 400);

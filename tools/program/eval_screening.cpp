@@ -1,5 +1,4 @@
 // mellin eval screening: how well overlapping submaps are told from others (paper, Section V-A, Figs. 3 to 5).
-#include <chrono>
 #include <cstdio>
 #include <memory>
 
@@ -17,49 +16,16 @@ using host::fixed;
 using host::PairScore;
 using host::PrecisionRecall;
 
-/// Scans a submap that the paper compares.
-constexpr std::uint16_t kContexts[] = {20, 40, 80};
-
 struct ScreeningOptions {
   EvalOptions common;
+  EvalChoice choice;
   std::vector<int> figures{3, 4, 5};
-  std::vector<std::string> methods{"best", "paper"};
-  std::vector<double> scales;
-  std::vector<std::uint16_t> scans;
-  std::vector<int> com;
-  std::vector<std::string> preprocessing;
 };
 
-/// One curve of one figure.
-struct Curve {
-  std::uint16_t scans = 40;
-  double scale = 100.0;  ///< per cent of the submap's 768 pixels
-  int com = 1;
-  std::string preprocessing = "erosion";
-  std::string method = "best";
-
-  std::uint16_t side() const { return static_cast<std::uint16_t>(768.0 * scale / 100.0); }
-  std::string key() const {
-    return std::to_string(scans) + " " + fixed(scale, 2) + " " + std::to_string(com) + " " + preprocessing + " " +
-           method;
-  }
-};
-
-struct Panel {
-  std::string title;
-  std::vector<std::pair<std::string, Curve>> curves;  ///< with their labels
-};
-
-struct Figure {
-  std::string name;
-  std::string title;
-  std::vector<Panel> panels;
-};
-
-Figure figure_3(const std::string& method) {
-  Figure figure{"fig3-" + method, "Match detection, unprocessed, peak position (" + method + " matcher)", {}};
+EvalFigure figure_3(const std::string& method) {
+  EvalFigure figure{"fig3-" + method, "Match detection, unprocessed, peak position (" + method + " matcher)", {}};
   for (const std::uint16_t scans : kContexts) {
-    Panel panel{"Context: " + std::to_string(scans) + " scans", {}};
+    EvalPanel panel{"Context: " + std::to_string(scans) + " scans", {}};
     for (const int com : {0, 1, 2}) {
       panel.curves.push_back({"CoM" + std::to_string(com), {scans, 100.0, com, "none", method}});
     }
@@ -68,10 +34,10 @@ Figure figure_3(const std::string& method) {
   return figure;
 }
 
-Figure figure_4(const std::string& method) {
-  Figure figure{"fig4-" + method, "Match detection, preprocessing (" + method + " matcher)", {}};
+EvalFigure figure_4(const std::string& method) {
+  EvalFigure figure{"fig4-" + method, "Match detection, preprocessing (" + method + " matcher)", {}};
   for (const std::uint16_t scans : kContexts) {
-    Panel panel{"Context: " + std::to_string(scans) + " scans", {}};
+    EvalPanel panel{"Context: " + std::to_string(scans) + " scans", {}};
     for (const char* preprocessing : {"none", "erosion", "blur"}) {
       panel.curves.push_back({preprocessing, {scans, 100.0, 1, preprocessing, method}});
     }
@@ -80,10 +46,10 @@ Figure figure_4(const std::string& method) {
   return figure;
 }
 
-Figure figure_5(const std::string& method) {
-  Figure figure{"fig5-" + method, "Match detection at reduced scale (" + method + " matcher)", {}};
+EvalFigure figure_5(const std::string& method) {
+  EvalFigure figure{"fig5-" + method, "Match detection at reduced scale (" + method + " matcher)", {}};
   for (const double scale : {50.0, 25.0, 12.5, 6.25}) {
-    Panel panel{"Scale: " + fixed(scale, 2) + " %", {}};
+    EvalPanel panel{"Scale: " + fixed(scale, 2) + " %", {}};
     for (const char* preprocessing : {"erosion", "blur"}) {
       panel.curves.push_back({preprocessing, {40, scale, 1, preprocessing, method}});
     }
@@ -92,37 +58,12 @@ Figure figure_5(const std::string& method) {
   return figure;
 }
 
-template <class T>
-std::vector<T> or_else(const std::vector<T>& given, std::vector<T> usual) {
-  return given.empty() ? usual : given;
-}
-
-/// Every combination of what was asked for.
-Figure chosen_figure(const ScreeningOptions& o) {
-  Figure figure{"chosen", "Match detection", {}};
-  for (const std::uint16_t scans : or_else<std::uint16_t>(o.scans, {40})) {
-    for (const double scale : or_else(o.scales, {25.0})) {
-      Panel panel{std::to_string(scans) + " scans, " + fixed(scale, 2) + " %", {}};
-      for (const std::string& method : o.methods) {
-        for (const std::string& preprocessing : or_else<std::string>(o.preprocessing, {"erosion"})) {
-          for (const int com : or_else(o.com, {1})) {
-            const std::string label = method + ", " + preprocessing + ", CoM" + std::to_string(com);
-            panel.curves.push_back({label, {scans, scale, com, preprocessing, method}});
-          }
-        }
-      }
-      figure.panels.push_back(panel);
-    }
+std::vector<EvalFigure> figures_of(const ScreeningOptions& o) {
+  if (o.choice.any()) {
+    return {figure_of(o.choice, "Match detection")};
   }
-  return figure;
-}
-
-std::vector<Figure> figures_of(const ScreeningOptions& o) {
-  if (!o.scales.empty() || !o.scans.empty() || !o.com.empty() || !o.preprocessing.empty()) {
-    return {chosen_figure(o)};
-  }
-  std::vector<Figure> figures;
-  for (const std::string& method : o.methods) {
+  std::vector<EvalFigure> figures;
+  for (const std::string& method : o.choice.methods) {
     for (const int number : o.figures) {
       figures.push_back(number == 3 ? figure_3(method) : number == 4 ? figure_4(method) : figure_5(method));
     }
@@ -174,7 +115,8 @@ struct Goal {
   double average_precision = 0.0;
   double recall_99 = 0.0;
 };
-bool goal_of(const std::string& building, const std::string& frames, const Curve& curve, Judged judged, Goal& goal) {
+bool goal_of(const std::string& building, const std::string& frames, const EvalCurve& curve, Judged judged,
+             Goal& goal) {
   if (frames != "random" || curve.scans != 40 || curve.method != "best") {
     return false;
   }
@@ -197,7 +139,10 @@ class ScreeningEvaluation {
         summary_({"log", "frames", "scans", "scale", "com", "preprocessing", "method", "score", "judged", "pairs",
                   "positives", "average_precision", "recall_at_p99", "recall_at_p95", "best_f1", "goal_ap",
                   "goal_recall_at_p99"}),
-        curves_({"log", "frames", "curve", "score", "judged", "threshold", "precision", "recall"}) {}
+        printed_({"log", "frames", "scans", "scale", "com", "preprocessing", "method", "score", "pairs", "AP", "R@.99",
+                  "(goal)", "union AP", "R@.99", "(goal)", "joint AP", "R@.99", "all AP", "R@.99"}),
+        curves_({"log", "frames", "scans", "scale", "com", "preprocessing", "method", "score", "judged", "threshold",
+                 "precision", "recall"}) {}
 
   void run() {
     for (const EvalBuilding& building : load_buildings(options_.common)) {
@@ -207,7 +152,7 @@ class ScreeningEvaluation {
     }
     host::write_file(options_.common.directory + "/screening.csv", summary_.csv());
     host::write_file(options_.common.directory + "/screening-curves.csv", curves_.csv());
-    std::fputs(summary_.text().c_str(), stdout);
+    std::fputs(printed_.text().c_str(), stdout);
   }
 
  private:
@@ -216,8 +161,8 @@ class ScreeningEvaluation {
   void run(const EvalBuilding& building, const std::string& frames) {
     EvalSets sets(building, options_.common, frames_named(frames));
     std::map<std::string, Found> done;
-    for (const Figure& figure : figures_of(options_)) {
-      for (const Panel& panel : figure.panels) {
+    for (const EvalFigure& figure : figures_of(options_)) {
+      for (const EvalPanel& panel : figure.panels) {
         for (const auto& [label, curve] : panel.curves) {
           if (done.count(curve.key()) == 0) {
             done[curve.key()] = evaluate(building.name, frames, curve, sets.of(curve.scans));
@@ -229,57 +174,76 @@ class ScreeningEvaluation {
   }
 
   /// The curves of detection by each score; fills the tables.
-  Found evaluate(const std::string& building, const std::string& frames, const Curve& curve, const EvalSets::Set& set) {
+  Found evaluate(const std::string& building, const std::string& frames, const EvalCurve& curve,
+                 const EvalSets::Set& set) {
     host::MatchVariant variant;
-    variant.matcher =
-        matcher_named(curve.method, curve.side(), static_cast<std::uint8_t>(curve.com), curve.preprocessing);
+    variant.matcher = curve.matcher();
     const std::vector<host::EvalPair> pairs = chosen_pairs(set.pairs, options_.common, curve.side());
-    const auto start = std::chrono::steady_clock::now();
+    show_progress(options_.common, building + ", " + frames + " frames, " + curve.key() + ": " +
+                                       std::to_string(pairs.size()) + " of " + std::to_string(set.pairs.size()) +
+                                       " pairs");
     const std::vector<std::vector<host::FoundPose>> found =
         host::match_pairs(set.submaps, pairs, variant, options_.common.threads);
-    std::fprintf(stderr, "%s, %s frames, %s: %zu of %zu pairs, %.1f s\n", building.c_str(), frames.c_str(),
-                 curve.key().c_str(), pairs.size(), set.pairs.size(),
-                 std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
     Found result;
     for (const char* score : {"peak", "agreement"}) {
       const std::vector<host::PoseDecision> poses = host::pose_decisions(pairs, found, score_named(score));
+      const std::vector<std::string> row{building,
+                                         frames,
+                                         std::to_string(curve.scans),
+                                         fixed(curve.scale, 2),
+                                         std::to_string(curve.com),
+                                         curve.preprocessing,
+                                         curve.method,
+                                         score};
+      std::vector<std::string> printed = row;
+      printed.push_back(std::to_string(pairs.size()));
       for (const Judged judged : kJudged) {
         const std::vector<Decision> decisions = decisions_of(pairs, poses, judged);
         const std::vector<PrecisionRecall> points = host::precision_recall(decisions);
-        record(building, frames, curve, score, judged, decisions, points);
+        Goal goal;
+        const bool has_goal = goal_of(building, frames, curve, judged, goal);
+        record(row, judged, decisions, points, has_goal ? &goal : nullptr, printed);
         if (judged == Judged::overlap) {
           result[score] = points;
         }
       }
+      printed_.add(printed);
     }
     return result;
   }
 
-  void record(const std::string& building, const std::string& frames, const Curve& curve, const std::string& score,
-              Judged judged, const std::vector<Decision>& decisions, const std::vector<PrecisionRecall>& points) {
+  /// A row of the summary and of the curves, and its share of the printed row.
+  void record(const std::vector<std::string>& name, Judged judged, const std::vector<Decision>& decisions,
+              const std::vector<PrecisionRecall>& points, const Goal* goal, std::vector<std::string>& printed) {
     std::size_t positives = 0;
     for (const Decision& d : decisions) {
       positives += d.wanted ? 1U : 0U;
     }
-    Goal goal;
-    const bool has_goal = goal_of(building, frames, curve, judged, goal);
-    summary_.add({building, frames, std::to_string(curve.scans), fixed(curve.scale, 2), std::to_string(curve.com),
-                  curve.preprocessing, curve.method, score, to_string(judged), std::to_string(decisions.size()),
-                  std::to_string(positives), fixed(host::average_precision(points)),
-                  fixed(host::recall_at_precision(points, 0.99)), fixed(host::recall_at_precision(points, 0.95)),
-                  fixed(host::best_f1(points)), has_goal ? fixed(goal.average_precision) : "",
-                  has_goal ? fixed(goal.recall_99) : ""});
+    const std::string precision = fixed(host::average_precision(points));
+    const std::string recall = fixed(host::recall_at_precision(points, 0.99));
+    const std::string goal_precision = goal != nullptr ? fixed(goal->average_precision) : "";
+    const std::string goal_recall = goal != nullptr ? fixed(goal->recall_99) : "";
+    std::vector<std::string> row = name;
+    row.insert(row.end(), {to_string(judged), std::to_string(decisions.size()), std::to_string(positives), precision,
+                           recall, fixed(host::recall_at_precision(points, 0.95)), fixed(host::best_f1(points)),
+                           goal_precision, goal_recall});
+    summary_.add(row);
+    printed.insert(printed.end(), {precision, recall});
+    if (judged == Judged::overlap || judged == Judged::united) {
+      printed.push_back(goal != nullptr ? "(" + goal_precision + " " + goal_recall + ")" : "");
+    }
     for (const PrecisionRecall& p : points) {
-      curves_.add({building, frames, curve.key(), score, to_string(judged), fixed(p.threshold, 5),
-                   fixed(p.precision, 5), fixed(p.recall, 5)});
+      row = name;
+      row.insert(row.end(), {to_string(judged), fixed(p.threshold, 5), fixed(p.precision, 5), fixed(p.recall, 5)});
+      curves_.add(row);
     }
   }
 
-  void draw(const std::string& building, const std::string& frames, const Figure& figure,
+  void draw(const std::string& building, const std::string& frames, const EvalFigure& figure,
             const std::map<std::string, Found>& done) const {
     for (const char* score : {"peak", "agreement"}) {
       std::vector<host::PlotPanel> panels;
-      for (const Panel& panel : figure.panels) {
+      for (const EvalPanel& panel : figure.panels) {
         host::PlotPanel plot{panel.title, {"Recall", 0.5, 1.0}, {"Precision", 0.5, 1.0}, {}, {}};
         for (const auto& [label, curve] : panel.curves) {
           std::vector<host::PlotPoint> points;
@@ -297,6 +261,7 @@ class ScreeningEvaluation {
 
   const ScreeningOptions& options_;
   host::Table summary_;
+  host::Table printed_;  ///< the same with a row for all that pairs are judged by
   host::Table curves_;
 };
 
@@ -311,23 +276,7 @@ void add_eval_screening(CLI::App& eval) {
       ->delimiter(',')
       ->check(CLI::Range(3, 5))
       ->default_str("3,4,5");
-  command->add_option("--method", options->methods, "matchers: best, paper")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"best", "paper"}))
-      ->default_str("best,paper");
-  const char* const combined = "every combination instead of the figures: ";
-  command->add_option("--scales", options->scales, std::string(combined) + "per cent of 768 pixels")
-      ->delimiter(',')
-      ->check(CLI::IsMember({100.0, 50.0, 25.0, 12.5, 6.25}));
-  command->add_option("--scans", options->scans, std::string(combined) + "scans a submap")
-      ->delimiter(',')
-      ->check(CLI::Range(4, 400));
-  command->add_option("--com", options->com, std::string(combined) + "radius of the peak's centre of mass")
-      ->delimiter(',')
-      ->check(CLI::Range(0, 3));
-  command->add_option("--preprocessing", options->preprocessing, std::string(combined) + "none, erosion, blur")
-      ->delimiter(',')
-      ->check(CLI::IsMember({"none", "erosion", "blur"}));
+  add_choice_options(*command, options->choice);
   command->callback([options] { ScreeningEvaluation(*options).run(); });
 }
 
