@@ -264,7 +264,7 @@ std::vector<EvalPair> make_pairs(const std::vector<EvalSubmap>& submaps, PairCho
       const std::size_t shared = shared_cells(submaps[a].area, submaps[b].area);
       const std::size_t smaller = std::min(submaps[a].area.cells, submaps[b].area.cells);
       const std::size_t either = submaps[a].area.cells + submaps[b].area.cells - shared;
-      EvalPair pair{a, b, 0.0, 0.0, between(submaps[a].truth_T_submap, submaps[b].truth_T_submap)};
+      EvalPair pair{a, b, 0.0, 0.0, between(submaps[a].truth_T_submap, submaps[b].truth_T_submap), 1.0};
       if (smaller > 0) {
         pair.overlap = static_cast<double>(shared) / static_cast<double>(smaller);
         pair.union_overlap = static_cast<double>(shared) / static_cast<double>(either);
