@@ -132,6 +132,8 @@ TEST_CASE("validate() refuses each field out of its range and names it") {
       {"min_peak", [](Config& c) { c.registration.matcher.min_peak = 1.5F; }},
       {"lowpass_sigma", [](Config& c) { c.screening.matcher.lowpass_sigma = kNaN; }},
       {"whitening_floor", [](Config& c) { c.registration.matcher.whitening_floor = 0.0F; }},
+      {"turns_per_bin", [](Config& c) { c.screening.matcher.turns_per_bin = 9; }},
+      {"kept_turns", [](Config& c) { c.registration.matcher.kept_turns = 1; }},
       {"edge_margin", [](Config& c) { c.screening.matcher.edge_margin = 0.2F; }},
       {"preprocessing", [](Config& c) { c.screening.matcher.preprocessing = static_cast<Preprocessing>(3); }},
       {"rotation", [](Config& c) { c.registration.matcher.rotation = static_cast<RotationMode>(4); }},
