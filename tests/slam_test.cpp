@@ -135,6 +135,7 @@ TEST_CASE("validate() refuses each field out of its range and names it") {
       {"turns_per_bin", [](Config& c) { c.screening.matcher.turns_per_bin = 9; }},
       {"kept_turns", [](Config& c) { c.registration.matcher.kept_turns = 1; }},
       {"edge_margin", [](Config& c) { c.screening.matcher.edge_margin = 0.2F; }},
+      {"min_overlap", [](Config& c) { c.screening.matcher.min_overlap = 0.0F; }},
       {"preprocessing", [](Config& c) { c.screening.matcher.preprocessing = static_cast<Preprocessing>(3); }},
       {"rotation", [](Config& c) { c.registration.matcher.rotation = static_cast<RotationMode>(4); }},
       {"high_pass", [](Config& c) { c.screening.matcher.high_pass = static_cast<HighPass>(3); }},

@@ -77,7 +77,7 @@ bool SpectralRegistration::begin_picture(const GridView& grid, Stage stage) {
 }
 
 void SpectralRegistration::begin_extract(Features& out, Stage stage) {
-  stage_ = matcher_.begin_extract(memory_.picture.obstacles, memory_.picture.observed, out) == Status::ok ? stage
+  stage_ = matcher_.begin_extract(memory_.picture.obstacles, out, memory_.picture.observed) == Status::ok ? stage
                                                                                                           : Stage::idle;
 }
 
