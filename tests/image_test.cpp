@@ -67,9 +67,9 @@ struct Digest {
   DigestOut out;
 };
 
-Status make(const GridView& grid, Digest& digest) {
-  std::vector<float> scratch(DigestMaker::scratch_size(grid.side, digest.out.side));
-  return make_digest(grid, {scratch.data(), scratch.size()}, digest.out);
+Status make(const GridView& grid, Digest& digest, Preprocessing preprocessing = Preprocessing::erosion) {
+  std::vector<float> scratch(DigestMaker::scratch_size(grid.side, digest.out.side, preprocessing));
+  return make_digest(grid, {scratch.data(), scratch.size()}, digest.out, preprocessing);
 }
 
 }  // namespace
@@ -93,8 +93,8 @@ TEST_SUITE("image") {
     REQUIRE(thicken(image.view(), out.view()) == Status::ok);
     CHECK(largest_difference(out.pixels, golden::kThickened) < 1e-6);
 
-    std::vector<float> line(16);
-    REQUIRE(blur(image.view(), out.view(), {line.data(), line.size()}) == Status::ok);
+    std::vector<float> lines(RowBlur::scratch_size(16, 1));
+    REQUIRE(blur(image.view(), out.view(), {lines.data(), lines.size()}) == Status::ok);
     CHECK(largest_difference(out.pixels, golden::kBlurred) < 1e-6);
 
     std::vector<float> scratch(EdgeBlur::scratch_size(16, 3));
@@ -165,10 +165,31 @@ TEST_SUITE("image") {
     const GridView grid{{golden::kCells, sizeof golden::kCells}, 32, 0.1F};
     REQUIRE(make(grid, digest) == Status::ok);
     for (std::size_t i = 0; i < 64; ++i) {
-      CHECK(std::fabs(digest.obstacles[i] / 255.0 - golden::kDigest[i]) <= 0.5 / 255 + 1e-6);
+      CHECK(std::fabs(digest.obstacles[i] / 255.0 - golden::kDigestErosion[i]) <= 0.5 / 255 + 1e-6);
     }
     CHECK(std::memcmp(digest.observed.data(), golden::kObserved, 8) == 0);
     CHECK(std::memcmp(digest.free.data(), golden::kFree, 8) == 0);
+  }
+
+  TEST_CASE("every preprocessing equals OpenCV's, halved and at the grid's own side") {
+    const GridView grid{{golden::kCells, sizeof golden::kCells}, 32, 0.1F};
+    const auto check = [&](Preprocessing preprocessing, std::uint16_t side, const double* expected) {
+      CAPTURE(static_cast<int>(preprocessing));
+      CAPTURE(side);
+      Digest digest(side);
+      REQUIRE(make(grid, digest, preprocessing) == Status::ok);
+      double largest = 0.0;
+      for (std::size_t i = 0; i < digest.obstacles.size(); ++i) {
+        largest = std::fmax(largest, std::fabs(digest.obstacles[i] / 255.0 - expected[i]));
+      }
+      CHECK(largest <= 0.5 / 255 + 1e-6);
+    };
+    check(Preprocessing::none, 8, golden::kDigestNone);
+    check(Preprocessing::none, 32, golden::kFullNone);
+    check(Preprocessing::erosion, 8, golden::kDigestErosion);
+    check(Preprocessing::erosion, 32, golden::kFullErosion);
+    check(Preprocessing::blur, 8, golden::kDigestBlur);
+    check(Preprocessing::blur, 32, golden::kFullBlur);
   }
 
   TEST_CASE("a digest of a drawn grid") {
@@ -223,6 +244,22 @@ TEST_SUITE("image") {
     CHECK(sliced.obstacles == whole.obstacles);
     CHECK(sliced.observed == whole.observed);
     CHECK(sliced.free == whole.free);
+
+    scratch.resize(DigestMaker::scratch_size(48, 6, Preprocessing::blur));
+    REQUIRE(make(grid, whole, Preprocessing::blur) == Status::ok);
+    REQUIRE(maker.begin(grid, {scratch.data(), scratch.size()}, sliced.out, Preprocessing::blur) == Status::ok);
+    while (!maker.step(1)) {
+    }
+    CHECK(sliced.obstacles == whole.obstacles);
+  }
+
+  TEST_CASE("what is blurred has room for the mirrored border") {
+    const std::vector<std::uint8_t> bytes(4 * 4, 1);
+    Digest digest(2);
+    CHECK(make({{bytes.data(), bytes.size()}, 4, 0.1F}, digest) == Status::ok);
+#ifdef NDEBUG
+    CHECK(make({{bytes.data(), bytes.size()}, 4, 0.1F}, digest, Preprocessing::blur) == Status::invalid_argument);
+#endif
   }
 
   TEST_CASE("a grid with nothing observed gives an empty digest") {

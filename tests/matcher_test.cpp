@@ -8,196 +8,16 @@
 #include <utility>
 #include <vector>
 
-#include "mellin/core/random.hpp"
-#include "mellin/grid/digest.hpp"
 #include "tests/golden/spectral.hpp"
+#include "tests/support/matcher_bench.hpp"
 #include "tests/support/trials.hpp"
 
 using namespace mellin;
+using namespace mellin::test;
 
 namespace {
 
-using Picture = std::vector<std::uint8_t>;
-
-/// A matcher with memory for itself and as many features as are asked for.
-class Bench {
- public:
-  explicit Bench(const MatcherConfig& config) : config_(config) {
-    MeasureArena measure;
-    Matcher::carve(measure, config);
-    memory_.resize(measure.use().total() / sizeof(double));
-    Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(memory_.data()), measure.use().total()));
-    REQUIRE(matcher.init(config, Matcher::carve(arena, config)) == Status::ok);
-    REQUIRE(arena.ok());
-    REQUIRE(arena.use().total() == measure.use().total());
-  }
-
-  /// Features over memory that lives as long as the bench.
-  Features carve(FeatureUse use = FeatureUse::both) {
-    MeasureArena measure;
-    Features::carve(measure, config_, use);
-    feature_memory_.emplace_back(measure.use().total() / sizeof(double));
-    std::vector<double>& memory = feature_memory_.back();
-    Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(memory.data()), measure.use().total()));
-    return Features::carve(arena, config_, use);
-  }
-  Features extract(const Picture& picture, FeatureUse use = FeatureUse::both) {
-    Features features = carve(use);
-    REQUIRE(matcher.extract({picture.data(), picture.size()}, {}, features) == Status::ok);
-    return features;
-  }
-  HypothesisList match(const Picture& a, const Picture& b) {
-    REQUIRE(matcher.match(extract(a), extract(b)) == Status::ok);
-    return matcher.hypotheses();
-  }
-
-  Matcher matcher;
-
- private:
-  MatcherConfig config_;
-  std::vector<double> memory_;
-  std::vector<std::vector<double>> feature_memory_;
-};
-
-MatcherConfig config_of(std::uint16_t side, float pixel_m = 1.0F) {
-  MatcherConfig config;
-  config.side = side;
-  config.pixel_m = pixel_m;
-  return config;
-}
-
-struct Wall {
-  double x0, y0, x1, y1;
-};
-
-/// A floor of an office building round the origin: two corridors, rooms of different sizes with doors, furniture.
-std::vector<Wall> office(std::uint64_t seed) {
-  Random random(seed, 1);
-  std::vector<Wall> walls;
-  for (const double corridor : {-1.0, 1.0}) {
-    for (double x = -24.0; x < 24.0;) {
-      const double width = 2.5 + 3.5 * random.uniform();
-      const double depth = corridor * (3.5 + 2.5 * random.uniform());
-      const double door = x + 0.3 + (width - 1.5) * random.uniform();
-      walls.push_back({x, corridor, door, corridor});
-      walls.push_back({door + 0.9, corridor, x + width, corridor});
-      walls.push_back({x, corridor, x, corridor + depth});
-      walls.push_back({x, corridor + depth, x + width, corridor + depth});
-      for (int i = 0; i < 2; ++i) {
-        const double fx = x + 0.4 + (width - 1.4) * random.uniform();
-        const double fy = corridor + depth * (0.2 + 0.6 * random.uniform());
-        walls.push_back({fx, fy, fx + 0.6 * random.uniform(), fy + 0.8 * (random.uniform() - 0.5)});
-      }
-      x += width;
-    }
-  }
-  for (const double x : {-7.0, -5.2}) {
-    walls.push_back({x, -14.0, x, -1.0});
-    walls.push_back({x, 5.0, x, 14.0 + x / 7.0});
-  }
-  return walls;
-}
-
-/// The submap at `world_T_submap`: what lies within `range_m` of it, drawn from the walls themselves, so that two
-/// submaps of the same walls are two samplings, not one picture turned.
-std::vector<std::uint8_t> render(const std::vector<Wall>& walls, const Pose2& world_T_submap, std::uint16_t side,
-                                 double cell_m, double range_m) {
-  std::vector<std::uint8_t> cells(std::size_t{side} * side, kUnobserved);
-  const double half = side / 2.0;
-  for (std::size_t r = 0; r < side; ++r) {
-    for (std::size_t c = 0; c < side; ++c) {
-      const double x = (static_cast<double>(c) + 0.5 - half) * cell_m;
-      const double y = (static_cast<double>(r) + 0.5 - half) * cell_m;
-      if (x * x + y * y < range_m * range_m) {
-        cells[r * side + c] = 0;
-      }
-    }
-  }
-  const Pose2 submap_T_world = inverse(world_T_submap);
-  for (const Wall& wall : walls) {
-    const double length = std::hypot(wall.x1 - wall.x0, wall.y1 - wall.y0);
-    const int points = static_cast<int>(length / cell_m * 4.0) + 2;
-    for (int i = 0; i < points; ++i) {
-      const double t = i / (points - 1.0);
-      const Pose2 p =
-          compose(submap_T_world, {wall.x0 + t * (wall.x1 - wall.x0), wall.y0 + t * (wall.y1 - wall.y0), 0});
-      const double c = std::floor(p.x / cell_m + half);
-      const double r = std::floor(p.y / cell_m + half);
-      if (p.x * p.x + p.y * p.y < range_m * range_m && c >= 0 && c < side && r >= 0 && r < side) {
-        cells[static_cast<std::size_t>(r) * side + static_cast<std::size_t>(c)] = kCertainlyOccupied;
-      }
-    }
-  }
-  return cells;
-}
-
-Picture digest_of(const std::vector<std::uint8_t>& cells, std::uint16_t grid_side, std::uint16_t side) {
-  Picture picture(std::size_t{side} * side);
-  std::vector<float> scratch(DigestMaker::scratch_size(grid_side, side));
-  DigestOut out;
-  out.obstacles = {picture.data(), picture.size()};
-  out.side = side;
-  REQUIRE(make_digest({{cells.data(), cells.size()}, grid_side, 0.1F}, {scratch.data(), scratch.size()}, out) ==
-          Status::ok);
-  return picture;
-}
-
-struct Error {
-  double metres;
-  double radians;
-};
-
-Error error_of(const Pose2& pose, const Pose2& truth) {
-  return {std::hypot(pose.x - truth.x, pose.y - truth.y), std::fabs(wrap_angle(pose.theta - truth.theta))};
-}
-
 Picture golden_picture(const std::uint8_t (&bytes)[48 * 48]) { return {bytes, bytes + 48 * 48}; }
-
-/// `picture` moved by whole pixels; what leaves the frame is lost.
-Picture moved(const Picture& picture, std::size_t side, int dx, int dy) {
-  Picture out(picture.size(), 0);
-  const auto n = static_cast<std::ptrdiff_t>(side);
-  for (std::ptrdiff_t r = 0; r < n; ++r) {
-    for (std::ptrdiff_t c = 0; c < n; ++c) {
-      if (c - dx >= 0 && c - dx < n && r - dy >= 0 && r - dy < n) {
-        out[static_cast<std::size_t>(r * n + c)] = picture[static_cast<std::size_t>((r - dy) * n + c - dx)];
-      }
-    }
-  }
-  return out;
-}
-
-/// `picture` turned by 90 degrees from x to y, exactly.
-Picture quarter_turned(const Picture& picture, std::size_t side) {
-  Picture out(picture.size());
-  for (std::size_t r = 0; r < side; ++r) {
-    for (std::size_t c = 0; c < side; ++c) {
-      out[c * side + (side - 1 - r)] = picture[r * side + c];
-    }
-  }
-  return out;
-}
-
-/// A small picture in the middle of a larger one.
-Picture centred(const Picture& picture, std::size_t side, std::size_t in) {
-  Picture out(in * in, 0);
-  const std::size_t border = (in - side) / 2;
-  for (std::size_t r = 0; r < side; ++r) {
-    for (std::size_t c = 0; c < side; ++c) {
-      out[(r + border) * in + c + border] = picture[r * side + c];
-    }
-  }
-  return out;
-}
-
-bool all_finite(const HypothesisList& hypotheses) {
-  for (const Hypothesis& h : hypotheses) {
-    if (!is_finite(h.a_T_b) || !std::isfinite(h.peak) || !std::isfinite(h.rotation_peak)) {
-      return false;
-    }
-  }
-  return true;
-}
 
 bool same_bits(const HypothesisList& a, const HypothesisList& b) {
   if (a.size() != b.size()) {
@@ -216,17 +36,33 @@ bool same_bits(const HypothesisList& a, const HypothesisList& b) {
 
 TEST_SUITE("matcher") {
   TEST_CASE("hypotheses equal those of a numpy implementation in double precision") {
-    Bench bench(config_of(48));
-    const HypothesisList found = bench.match(golden_picture(golden::kPictureA), golden_picture(golden::kPictureB));
-    REQUIRE(found.size() == std::size(golden::kHypotheses));
-    for (std::size_t i = 0; i < found.size(); ++i) {
-      const double(&expected)[5] = golden::kHypotheses[i];
-      CHECK(found[i].a_T_b.x == doctest::Approx(expected[0]).epsilon(1e-3));
-      CHECK(found[i].a_T_b.y == doctest::Approx(expected[1]).epsilon(1e-3));
-      CHECK(found[i].a_T_b.theta == doctest::Approx(expected[2]).epsilon(1e-4));
-      CHECK(static_cast<double>(found[i].peak) == doctest::Approx(expected[3]).epsilon(1e-3));
-      CHECK(static_cast<double>(found[i].rotation_peak) == doctest::Approx(expected[4]).epsilon(1e-4));
-    }
+    const auto check = [](const char* name, const MatcherConfig& config, const auto& expected) {
+      CAPTURE(name);
+      Bench bench(config);
+      const HypothesisList found = bench.match(golden_picture(golden::kPictureA), golden_picture(golden::kPictureB));
+      REQUIRE(found.size() == std::size(expected));
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        CHECK(found[i].a_T_b.x == doctest::Approx(expected[i][0]).epsilon(1e-3));
+        CHECK(found[i].a_T_b.y == doctest::Approx(expected[i][1]).epsilon(1e-3));
+        CHECK(found[i].a_T_b.theta == doctest::Approx(expected[i][2]).epsilon(1e-4));
+        CHECK(static_cast<double>(found[i].peak) == doctest::Approx(expected[i][3]).epsilon(1e-3));
+        CHECK(static_cast<double>(found[i].rotation_peak) == doctest::Approx(expected[i][4]).epsilon(1e-4));
+        CHECK(static_cast<double>(found[i].scale) == doctest::Approx(expected[i][5]).epsilon(1e-4));
+      }
+    };
+    check("rings", config_of(48), golden::kHypotheses);
+    MatcherConfig linear = config_of(48);
+    linear.rotation = RotationMode::linear_polar;
+    linear.high_pass = HighPass::none;
+    linear.com_radius = 2;
+    check("linear polar", linear, golden::kLinearPolar);
+    MatcherConfig logarithmic = config_of(48);
+    logarithmic.rotation = RotationMode::log_polar;
+    logarithmic.peak_fit = PeakFit::gaussian;
+    check("log-polar", logarithmic, golden::kLogPolar);
+    MatcherConfig paper = paper_matcher(48);
+    paper.pixel_m = 1.0F;
+    check("the paper's", paper, golden::kPaper);
   }
 
   TEST_CASE("a picture against itself: no motion, peaks near 1") {
@@ -484,6 +320,50 @@ TEST_SUITE("matcher") {
     CHECK(identity);
   }
 
+  TEST_CASE("the query's kept turns, however many, and every vector unit give the same bits") {
+    MatcherConfig config = config_of(96, 0.4F);
+    config.turns_per_bin = 4;
+    std::vector<Picture> stored;
+    for (int i = 0; i < 6; ++i) {
+      stored.push_back(digest_of(render(office(1), {2.0 * i, -1.0 * i, 0.35 * i}, 384, 0.1, 17.0), 384, 96));
+    }
+    const Picture queries[] = {stored[2], digest_of(render(office(1), {1.0, 2.0, 0.3}, 384, 0.1, 17.0), 384, 96)};
+    const auto run = [&](std::uint16_t kept, VectorUnit unit) {
+      config.kept_turns = kept;
+      Bench bench(config, unit);
+      std::vector<Hypothesis> all;
+      std::vector<Features> features;
+      for (const Picture& picture : stored) {
+        features.push_back(bench.extract(picture));
+      }
+      Features query = bench.carve();
+      for (int pass = 0; pass < 2; ++pass) {  // the second query lies where the first did
+        const Picture& picture = queries[pass];
+        REQUIRE(bench.matcher.extract({picture.data(), picture.size()}, {}, query) == Status::ok);
+        bench.matcher.keep_turned(query);
+        for (const Features& other : features) {
+          REQUIRE(bench.matcher.match(other, query) == Status::ok);
+          all.insert(all.end(), bench.matcher.hypotheses().begin(), bench.matcher.hypotheses().end());
+        }
+      }
+      return all;
+    };
+    const std::vector<Hypothesis> plain = run(0, VectorUnit::portable);
+    for (const std::uint16_t kept : std::initializer_list<std::uint16_t>{0, 1, 5, 384}) {
+      CAPTURE(kept);
+      const std::vector<Hypothesis> found = run(kept, best_vector_unit());
+      REQUIRE(found.size() == plain.size());
+      for (std::size_t i = 0; i < found.size(); ++i) {
+        CHECK(found[i].a_T_b.x == plain[i].a_T_b.x);
+        CHECK(found[i].a_T_b.y == plain[i].a_T_b.y);
+        CHECK(found[i].a_T_b.theta == plain[i].a_T_b.theta);
+        CHECK(found[i].peak == plain[i].peak);
+        const double steps = plain[i].a_T_b.theta / (kPi / (96 * 4));
+        CHECK(std::fabs(steps - std::round(steps)) < 1e-6);
+      }
+    }
+  }
+
   TEST_CASE("hypotheses are sorted and distinct") {
     Bench bench(config_of(96, 0.4F));
     const HypothesisList found = bench.match(digest_of(render(office(3), {}, 384, 0.1, 17.0), 384, 96),
@@ -529,7 +409,13 @@ TEST_SUITE("matcher") {
                                    with([](auto& c) { c.com_radius = 4; }),
                                    with([](auto& c) { c.lowpass_sigma = -1.0F; }),
                                    with([](auto& c) { c.whitening_floor = 0.0F; }),
-                                   with([](auto& c) { c.edge_margin = NAN; })};
+                                   with([](auto& c) { c.edge_margin = NAN; }),
+                                   with([](auto& c) { c.turns_per_bin = 9; }),
+                                   with([](auto& c) { c.kept_turns = 1; }),
+                                   with([](auto& c) {
+                                     c.turns_per_bin = 2;
+                                     c.kept_turns = 2 * 96 + 1;
+                                   })};
     for (const MatcherConfig& config : wrong) {
       Matcher matcher;
       CHECK(matcher.init(config, {}) == Status::invalid_config);

@@ -54,7 +54,9 @@ Status SpectralRegistration::begin(const GridView& a) {
 }
 
 bool SpectralRegistration::begin_picture(const GridView& grid, Stage stage) {
-  stage_ = maker_.begin(grid, memory_.scratch, memory_.picture) == Status::ok ? stage : Stage::idle;
+  stage_ = maker_.begin(grid, memory_.scratch, memory_.picture, config_.matcher.preprocessing) == Status::ok
+               ? stage
+               : Stage::idle;
   return stage_ != Stage::idle;
 }
 

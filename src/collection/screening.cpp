@@ -92,10 +92,11 @@ Status SpectralScreening::begin_describe(std::uint32_t index, const GridView& gr
   }
   a_ = index;
   featured_b_ = kNone;
+  kept_b_ = kNone;
   classified_b_ = kNone;
   described_ = index;
   restored_ = kNone;
-  const Status status = maker_.begin(grid, memory_.scratch, digest_out(index));
+  const Status status = maker_.begin(grid, memory_.scratch, digest_out(index), config_.matcher.preprocessing);
   stage_ = status == Status::ok ? Stage::digest : Stage::idle;
   return status;
 }
@@ -105,8 +106,9 @@ Status SpectralScreening::begin_restore(std::uint32_t index, Span<const std::uin
   if (index >= config_.max_submaps || digest.size() != digest_size(config_.matcher.side)) {
     return Status::invalid_argument;
   }
-  if (index == classified_b_ || index == featured_b_) {
+  if (index == classified_b_ || index == featured_b_ || index == kept_b_) {
     featured_b_ = kNone;
+    kept_b_ = kNone;
     classified_b_ = kNone;
   }
   restored_ = index;
@@ -140,6 +142,10 @@ void SpectralScreening::begin_match() {
   const bool cached = config_.cache_features;
   const Features fa = cached ? cached_features(a_) : features_a_;
   const Features fb = cached ? cached_features(b_) : features_b_;
+  if (kept_b_ != b_) {
+    matcher_.keep_turned(fb);
+    kept_b_ = b_;
+  }
   stage_ = matcher_.begin_match(fa, fb) == Status::ok ? Stage::match : Stage::idle;
 }
 
@@ -175,9 +181,9 @@ bool SpectralScreening::step() {
       break;
     case Stage::match:
       if (matcher_.step()) {
-        class_a_ = classes(a_, memory_.classes_a);
+        class_a_ = classes(a_, memory_.classes_a, memory_.obstacles_a);
         if (classified_b_ != b_) {
-          class_b_ = classes(b_, memory_.classes_b);
+          class_b_ = classes(b_, memory_.classes_b, memory_.obstacles_b);
           classified_b_ = b_;
         }
         verify_next_ = 0;
@@ -191,21 +197,24 @@ bool SpectralScreening::step() {
   return stage_ == Stage::idle;
 }
 
-ClassView SpectralScreening::classes(std::uint32_t index, Span<std::uint8_t> out) {
+ClassObstacles SpectralScreening::classes(std::uint32_t index, Span<std::uint8_t> out, Span<ClassCell> cells) {
   const Result<ClassView> view = classify(digest_out(index).view(config_.matcher.pixel_m), config_.verification, out);
-  return view.ok() ? view.value() : ClassView{};
+  if (!view.ok()) {
+    return {};
+  }
+  const Result<Span<const ClassCell>> found = obstacles(view.value(), cells);
+  return {view.value(), found.ok() ? found.value() : Span<const ClassCell>()};
 }
 
 void SpectralScreening::verify_one() {
   const HypothesisList& found = matcher_.hypotheses();
   const Hypothesis& h = found[verify_next_];
-  const Result<Agreement> agreement = verify(class_a_, class_b_, h.a_T_b, config_.verification);
+  const Result<Agreement> agreement = verify_obstacles(class_a_, class_b_, h.a_T_b, config_.verification);
   PlaceHypothesis out;
   out.a_T_b = h.a_T_b;
   out.peak = h.peak;
   if (agreement.ok()) {
     out.agreement = agreement.value().score;
-    out.overlap = agreement.value().overlap;
   }
   insert_by_agreement(hypotheses_, out);
   ++verify_next_;

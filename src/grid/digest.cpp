@@ -30,11 +30,15 @@ void set_bit(Span<std::uint8_t> mask, std::size_t i) {
 
 }  // namespace
 
-Status DigestMaker::begin(const GridView& grid, Span<float> scratch, const DigestOut& out) {
+Status DigestMaker::begin(const GridView& grid, Span<float> scratch, const DigestOut& out,
+                          Preprocessing preprocessing) {
+  const bool blurred = preprocessing == Preprocessing::blur;
+  const std::size_t least_side = blurred ? RowBlur::kMinSide : 1;
   const bool valid = grid.side > 0 && grid.cells.size() == std::size_t{grid.side} * grid.side && out.side > 0 &&
                      is_power_of_two_multiple(grid.side, out.side) &&
                      out.obstacles.size() == std::size_t{out.side} * out.side && fits(out.observed, out.side) &&
-                     fits(out.free, out.side) && scratch.size() >= scratch_size(grid.side, out.side);
+                     fits(out.free, out.side) && scratch.size() >= scratch_size(grid.side, out.side, preprocessing) &&
+                     (out.side == grid.side ? out.side : 2U * out.side) >= least_side;
   assert(valid);
   stage_ = Stage::done;
   if (!valid) {
@@ -42,7 +46,10 @@ Status DigestMaker::begin(const GridView& grid, Span<float> scratch, const Diges
   }
   grid_ = grid;
   out_ = out;
-  scratch_ = scratch;
+  preprocessing_ = preprocessing;
+  picture_ = scratch.first(scratch_size(grid.side, out.side));
+  const std::size_t kept = blurred ? RowBlur::scratch_size(grid.side, out.side == grid.side ? 1 : 2) : 0;
+  blur_scratch_ = scratch.subspan(picture_.size(), kept);
   std::fill(out.observed.begin(), out.observed.end(), std::uint8_t{0});
   std::fill(out.free.begin(), out.free.end(), std::uint8_t{0});
   stage_ = Stage::masks;
@@ -131,49 +138,96 @@ void DigestMaker::mask_row(std::size_t row) {
   }
 }
 
+template <class Read>
+void DigestMaker::preprocess_and_halve(const Read& read, std::size_t side, std::size_t row) {
+  float* const out = picture_.data() + row * side_;
+  switch (preprocessing_) {
+    case Preprocessing::erosion:
+      largest_ = std::max(largest_, thicken_and_halve_row(read, side, row, out));
+      return;
+    case Preprocessing::blur:
+      row_blur_.make_row(read, side, 2, row, blur_scratch_, out);
+      break;
+    case Preprocessing::none:
+      for (std::size_t c = 0; c < side_; ++c) {
+        const float upper = read(2 * c, 2 * row) + read(2 * c + 1, 2 * row);
+        const float lower = read(2 * c, 2 * row + 1) + read(2 * c + 1, 2 * row + 1);
+        out[c] = 0.25F * (upper + lower);
+      }
+      break;
+  }
+  largest_ = std::max(largest_, *std::max_element(out, out + side_));
+}
+
 /// The first halving reads the grid itself, so that no picture of its side is needed. Without any, the maximum is all
 /// that is wanted: thickening does not change it.
 void DigestMaker::first_row(std::size_t row) {
   const GridView& grid = grid_;
-  if (side_ == grid.side) {
-    for (std::size_t c = 0; c < grid.side; ++c) {
-      largest_ = std::max(largest_, hits(grid.cells[row * grid.side + c]));
-    }
+  const auto read = [&grid](std::size_t c, std::size_t r) { return hits(grid.cells.data()[r * grid.side + c]); };
+  if (side_ != grid.side) {
+    return preprocess_and_halve(read, grid.side, row);
+  }
+  if (preprocessing_ == Preprocessing::blur) {
+    const float* const blurred = blurred_full_row(row);
+    largest_ = std::max(largest_, *std::max_element(blurred, blurred + side_));
     return;
   }
-  const auto read = [&grid](std::size_t c, std::size_t r) { return hits(grid.cells.data()[r * grid.side + c]); };
-  largest_ = std::max(largest_, thicken_and_halve_row(read, grid.side, row, scratch_.data() + row * side_));
+  for (std::size_t c = 0; c < grid.side; ++c) {
+    largest_ = std::max(largest_, read(c, row));
+  }
 }
 
 void DigestMaker::halve_row(std::size_t row) {
   const std::size_t from = 2 * std::size_t{side_};
-  const float* const pixels = scratch_.data();
+  const float* const pixels = picture_.data();
   const auto read = [pixels, from](std::size_t c, std::size_t r) { return pixels[r * from + c]; };
-  largest_ = std::max(largest_, thicken_and_halve_row(read, from, row, scratch_.data() + row * side_));
+  preprocess_and_halve(read, from, row);
+}
+
+/// Row `row` of the grid, blurred; valid until the next one. Made twice, for the maximum and to be written, which
+/// spares a picture.
+const float* DigestMaker::blurred_full_row(std::size_t row) {
+  const GridView& grid = grid_;
+  const auto read = [&grid](std::size_t c, std::size_t r) { return hits(grid.cells.data()[r * grid.side + c]); };
+  // Once a row is blurred along, the line that it was read into is free.
+  float* const out = blur_scratch_.data() + RowBlur::kMaxTaps * grid.side;
+  row_blur_.make_row(read, grid.side, 1, row, blur_scratch_, out);
+  return out;
+}
+
+/// A cell's hits after erosion of the free space round it.
+float DigestMaker::thickened(std::size_t column, std::size_t row) const {
+  const std::size_t last = grid_.side - 1U;
+  float value = 0.0F;
+  for (std::size_t r = row == 0 ? 0 : row - 1; r <= std::min(row + 1, last); ++r) {
+    for (std::size_t c = column == 0 ? 0 : column - 1; c <= std::min(column + 1, last); ++c) {
+      value = std::max(value, hits(grid_.cells[r * grid_.side + c]));
+    }
+  }
+  return value;
 }
 
 /// One division at the end equals normalising at every scale: maxima and means scale with their arguments.
 void DigestMaker::write_row(std::size_t row) {
   const float scale = largest_ > 0.0F ? 255.0F / largest_ : 0.0F;
-  const std::size_t last = out_.side - 1U;
-  for (std::size_t c = 0; c <= last; ++c) {
+  const bool full = out_.side == grid_.side;
+  const float* const blurred = full && preprocessing_ == Preprocessing::blur ? blurred_full_row(row) : nullptr;
+  for (std::size_t c = 0; c < out_.side; ++c) {
     float value = 0.0F;
-    if (out_.side == grid_.side) {
-      for (std::size_t r = row == 0 ? 0 : row - 1; r <= std::min(row + 1, last); ++r) {
-        for (std::size_t k = c == 0 ? 0 : c - 1; k <= std::min(c + 1, last); ++k) {
-          value = std::max(value, hits(grid_.cells[r * grid_.side + k]));
-        }
-      }
+    if (!full) {
+      value = picture_[row * out_.side + c];
+    } else if (blurred != nullptr) {
+      value = blurred[c];
     } else {
-      value = scratch_[row * out_.side + c];
+      value = preprocessing_ == Preprocessing::erosion ? thickened(c, row) : hits(grid_.cells[row * grid_.side + c]);
     }
     out_.obstacles[row * out_.side + c] = static_cast<std::uint8_t>(std::min(255.0F, value * scale + 0.5F));
   }
 }
 
-Status make_digest(const GridView& grid, Span<float> scratch, const DigestOut& out) {
+Status make_digest(const GridView& grid, Span<float> scratch, const DigestOut& out, Preprocessing preprocessing) {
   DigestMaker maker;
-  const Status status = maker.begin(grid, scratch, out);
+  const Status status = maker.begin(grid, scratch, out, preprocessing);
   while (!maker.step(out.side)) {
   }
   return status;

@@ -23,12 +23,6 @@ void gaussian_kernel(double sigma, Span<float> half) {
   }
 }
 
-/// Index i - offset or i + offset mirrored into [0, side) without repeating the border pixel.
-std::size_t mirrored_below(std::size_t i, std::size_t offset) { return i >= offset ? i - offset : offset - i; }
-std::size_t mirrored_above(std::size_t i, std::size_t offset, std::size_t side) {
-  return i + offset < side ? i + offset : 2 * (side - 1) - (i + offset);
-}
-
 /// out[i] = the `size` elements from padded[radius] on, each under the kernel; kernel: one half, centre first.
 void convolve(const float* padded, std::size_t size, Span<const float> kernel, float* out) {
   const std::size_t radius = kernel.size() - 1;
@@ -88,32 +82,17 @@ Status thicken(const ImageView& in, const ImageView& out) {
   return Status::ok;
 }
 
-Status blur(const ImageView& in, const ImageView& out, Span<float> line) {
-  const bool valid =
-      is_consistent(in) && is_consistent(out) && in.side == out.side && in.side >= 5 && line.size() >= in.side;
+Status blur(const ImageView& in, const ImageView& out, Span<float> scratch) {
+  const bool valid = is_consistent(in) && is_consistent(out) && in.side == out.side && in.side >= RowBlur::kMinSide &&
+                     scratch.size() >= RowBlur::scratch_size(in.side, 1);
   assert(valid);
   if (!valid) {
     return Status::invalid_argument;
   }
-  constexpr std::size_t kRadius = 4;
-  float kernel[kRadius + 1] = {};
-  gaussian_kernel(1.0, kernel);
-  const std::size_t side = in.side;
-  for (std::size_t r = 0; r < side; ++r) {
-    for (std::size_t c = 0; c < side; ++c) {
-      float sum = kernel[0] * in.row(r)[c];
-      for (std::size_t k = 1; k <= kRadius; ++k) {
-        sum += kernel[k] * (in.row(mirrored_below(r, k))[c] + in.row(mirrored_above(r, k, side))[c]);
-      }
-      line[c] = sum;
-    }
-    for (std::size_t c = 0; c < side; ++c) {
-      float sum = kernel[0] * line[c];
-      for (std::size_t k = 1; k <= kRadius; ++k) {
-        sum += kernel[k] * (line[mirrored_below(c, k)] + line[mirrored_above(c, k, side)]);
-      }
-      out.row(r)[c] = sum;
-    }
+  RowBlur row_blur;
+  const auto read = [&in](std::size_t c, std::size_t r) { return in.at(c, r); };
+  for (std::size_t r = 0; r < in.side; ++r) {
+    row_blur.make_row(read, in.side, 1, r, scratch, out.row(r));
   }
   return Status::ok;
 }

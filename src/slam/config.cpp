@@ -121,6 +121,25 @@ Status validate_numbers(const Config& c, const Log& log) {
   return validate_all(fields, log);
 }
 
+Status validate_matcher(const MatcherConfig& m, const Log& log) {
+  constexpr float kMuch = 999.0F;
+  const auto number = [](auto value) { return static_cast<float>(value); };
+  const Limits fields[] = {
+      {"max_peaks", number(m.max_peaks), 1.0F, number(kMaxRotationPeaks), false, "1 to 6"},
+      {"com_radius", number(m.com_radius), 0.0F, 3.0F, true, "0 to 3"},
+      {"peak_share", m.peak_share, 0.0F, 1.0F, true, "0 to 1"},
+      {"min_peak", m.min_peak, 0.0F, 1.0F, true, "0 to 1"},
+      {"lowpass_sigma", m.lowpass_sigma, 0.0F, kMuch, true, "0 to 999"},
+      {"whitening_floor", m.whitening_floor, 0.0F, 1.0F, false, "over 0, at most 1"},
+      {"edge_margin", m.edge_margin, 0.0F, 0.1F, false, "over 0, at most 0.1"},
+      {"preprocessing", number(m.preprocessing), 0.0F, number(Preprocessing::blur), true, "a Preprocessing"},
+      {"rotation", number(m.rotation), 0.0F, number(RotationMode::log_polar_scale), true, "a RotationMode"},
+      {"high_pass", number(m.high_pass), 0.0F, number(HighPass::reddy), true, "a HighPass"},
+      {"peak_fit", number(m.peak_fit), 0.0F, number(PeakFit::gaussian), true, "a PeakFit"},
+  };
+  return validate_all(fields, log);
+}
+
 /// Arrays whose lengths are products: within 2^31 elements, so that a 32-bit processor measures them right.
 Status validate_products(const Config& c, const Log& log) {
   constexpr std::uint64_t kMost = std::uint64_t{1} << 31U;
@@ -206,6 +225,12 @@ Status validate(const Config& given, Log log) {
   }
   if (!is_fft_side(c.registration_side) || !halves_to(c.side, c.registration_side)) {
     return refuse(log, "registration_side", c.registration_side, kTransformed);
+  }
+  for (const MatcherConfig* const matcher : {&c.screening.matcher, &c.registration.matcher}) {
+    const Status status = validate_matcher(*matcher, log);
+    if (status != Status::ok) {
+      return status;
+    }
   }
   if (c.class_side < 16 || c.side % c.class_side != 0) {
     return refuse(log, "class_side", c.class_side, "a divisor of side, at least 16");

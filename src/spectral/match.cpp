@@ -25,9 +25,60 @@ std::size_t Matcher::rotation_count() const {
   return std::min(rotation_.peaks().size(), most);
 }
 
+/// Multiple of the angular step nearest to the rotation under way; cyclic, since both it and the half turn beyond are
+/// looked at.
+std::uint32_t Matcher::turn_index() const {
+  const auto steps = static_cast<std::uint32_t>(config_.side * config_.turns_per_bin);
+  const double turns = rotation_.peaks()[rotation_index_].angle_rad / kPi;  // half turns
+  const double fraction = turns - floor(turns);
+  return static_cast<std::uint32_t>(fraction * static_cast<double>(steps) + 0.5) % steps;
+}
+
+double Matcher::turned_angle() const {
+  if (config_.turns_per_bin == 0) {
+    return rotation_.peaks()[rotation_index_].angle_rad;
+  }
+  return turn_index() * kPi / (static_cast<double>(config_.side) * config_.turns_per_bin);
+}
+
+/// Of the angle that is turned by about the peak's, rad^2: within half a step it is uniform.
+float Matcher::turn_variance() const {
+  if (config_.turns_per_bin == 0) {
+    return 0.0F;
+  }
+  const double step_rad = kPi / (static_cast<double>(config_.side) * config_.turns_per_bin);
+  return static_cast<float>(step_rad * step_rad / 12.0);
+}
+
+/// Where b's spectrum at this rotation is known, it need not be made.
+Matcher::Stage Matcher::begin_rotation() {
+  turned_ = memory_.first;
+  const bool kept = b_.image.data() == query_ && rotation_.peaks()[rotation_index_].scale == 1.0F;
+  if (!kept) {
+    return Stage::turned_rows;
+  }
+  const std::size_t size = spectrum_size(config_.side);
+  const std::size_t place = memory_.turn_place[turn_index()];
+  if (place > 0) {
+    turned_ = memory_.turns.subspan((place - 1) * size, size);
+    return Stage::filter_columns;
+  }
+  if (turns_ < config_.kept_turns) {
+    turned_ = memory_.turns.subspan(turns_ * size, size);
+  }
+  return Stage::turned_rows;
+}
+
+/// The spectrum under way is done; it lies behind those that are kept already if it is to be kept.
+void Matcher::keep_turn() {
+  if (turned_.data() != memory_.first.data()) {
+    memory_.turn_place[turn_index()] = static_cast<std::uint16_t>(++turns_);
+  }
+}
+
 void Matcher::transform_turned_rows(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
-  const SinCos turn = sincos(rotation_.peaks()[rotation_index_].angle_rad);
+  const SinCos turn = sincos(turned_angle());
   // A picture enlarged by s is read at coordinates smaller by s.
   const double scale = static_cast<double>(rotation_.peaks()[rotation_index_].scale);
   const SinCosF turn_f{static_cast<float>(turn.sin / scale), static_cast<float>(turn.cos / scale)};
@@ -37,18 +88,17 @@ void Matcher::transform_turned_rows(std::size_t first, std::size_t count) {
     for (std::size_t i = 0; i < rows; ++i) {
       turned_row(image, turn_f, r + i, fft_.kernels(), memory_.rows.data() + i * side);
     }
-    fft_.forward_rows(memory_.rows.data(), r, rows, memory_.first);
+    fft_.forward_rows(memory_.rows.data(), r, rows, turned_);
   }
 }
 
 /// The phases of the turned picture, in place.
 void Matcher::whiten_turned_columns(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
-  const Span<Complex> turned = memory_.first;
   for (std::size_t kx = first; kx < first + count; kx += kFftLanes) {
     const std::size_t columns = std::min(kFftLanes, first + count - kx);
-    fft_.forward_columns(turned, kx, columns);
-    fft_.kernels().whiten(turned.data() + kx * side, columns * side, b_.floor);
+    fft_.forward_columns(turned_, kx, columns);
+    fft_.kernels().whiten(turned_.data() + kx * side, columns * side, b_.floor);
   }
 }
 
@@ -58,7 +108,7 @@ void Matcher::whiten_turned_columns(std::size_t first, std::size_t count) {
 void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
   const std::size_t last = side / 2;
-  const Complex* const turned = memory_.first.data();
+  const Complex* const turned = turned_.data();
   const Complex* const filter = a_.filter.data();
   Complex* const straight = memory_.lines.data();
   Complex* const straight_last = straight + kFftLanes * side;
@@ -77,16 +127,32 @@ void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
   }
 }
 
+void Matcher::begin_surface() {
+  peak_ = {};
+  peaks_.begin(config_.side, config_.translation_peaks);
+}
+
 /// The correlation surface is looked at as it comes, a block of rows at a time, and never stored.
 void Matcher::search_surface_rows(std::size_t first, std::size_t count) {
   for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
-    fft_.inverse_rows_search(surface(), r, std::min(Fft2::kBlock, first + count - r), peak_);
+    const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
+    if (config_.translation_peaks == 1) {
+      fft_.inverse_rows_search(surface(), r, rows, peak_);
+      continue;
+    }
+    fft_.inverse_rows(surface(), r, rows, memory_.rows.data());
+    for (std::size_t i = 0; i < rows; ++i) {
+      peaks_.add_row(r + i, memory_.rows.subspan(i * config_.side, config_.side));
+    }
+  }
+  if (config_.translation_peaks == 1 && first + count == config_.side && peak_.value > 0.0F) {
+    peaks_.add(peak_);
   }
 }
 
-/// The highest value's place, refined, and the pose that it means.
-void Matcher::locate_peak() {
-  if (!(peak_.value > 0.0F) || peak_.value < config_.min_peak) {
+/// A peak's place, refined, and the pose that it means.
+void Matcher::locate_peak(const Fft2::Peak& peak) {
+  if (peak.value < config_.min_peak) {
     return;
   }
   const std::size_t side = config_.side;
@@ -94,23 +160,29 @@ void Matcher::locate_peak() {
   PeakWindow window;
   for (int dy = -radius; dy <= radius; ++dy) {
     float* const row = memory_.rows.data();
-    fft_.inverse_rows(surface(), cyclic(peak_.row, dy, side), 1, row);
-    window.set_row(dy, {row, side}, peak_.column, radius);
+    fft_.inverse_rows(surface(), cyclic(peak.row, dy, side), 1, row);
+    window.set_row(dy, {row, side}, peak.column, radius);
   }
   const PeakOffset offset = peak_offset(window, radius, config_);
   // Turning pixel centres 0 … side - 1 by 180 degrees about their middle maps i to side - 1 - i, whereas the conjugate
   // spectrum stands for -i: a shift of side - 1 is to be taken off.
   const double mirrored = half_turn_ ? static_cast<double>(side - 1) : 0.0;
-  const double x = static_cast<double>(peak_.column) + offset.x - mirrored;
-  const double y = static_cast<double>(peak_.row) + offset.y - mirrored;
+  const double x = static_cast<double>(peak.column) + offset.x - mirrored;
+  const double y = static_cast<double>(peak.row) + offset.y - mirrored;
   const auto pixel_m = static_cast<double>(config_.pixel_m);
   const RotationPeak& rotation = rotation_.peaks()[rotation_index_];
   Hypothesis hypothesis;
   hypothesis.a_T_b = {nearest_shift(x, side) * pixel_m, nearest_shift(y, side) * pixel_m,
-                      wrap_angle(rotation.angle_rad + (half_turn_ ? kPi : 0.0))};
-  hypothesis.peak = peak_.value;
+                      wrap_angle(turned_angle() + (half_turn_ ? kPi : 0.0))};
+  hypothesis.peak = peak.value;
   hypothesis.rotation_peak = rotation.strength;
   hypothesis.scale = rotation.scale;
+  const double quarter = 0.25 * static_cast<double>(side);
+  const PeakSpread spread = spread_by_gradient(curvature(window, radius), gradient_noise_, quarter);
+  const double fit = fit_variance(config_, PeakKind::whitened);
+  const double square_m = pixel_m * pixel_m;
+  hypothesis.covariance = {static_cast<float>((spread.xx + fit) * square_m), static_cast<float>(spread.xy * square_m),
+                           static_cast<float>((spread.yy + fit) * square_m), rotation.variance + turn_variance()};
   add_hypothesis(hypothesis);
 }
 
@@ -126,13 +198,7 @@ void Matcher::add_hypothesis(const Hypothesis& hypothesis) {
       if (hypotheses_[i].peak >= hypothesis.peak) {
         return;
       }
-      HypothesisList others;
-      for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
-        if (k != i) {
-          others.insert(others.size(), hypotheses_[k]);
-        }
-      }
-      hypotheses_ = others;
+      hypotheses_.erase(i);
       break;
     }
   }

@@ -36,7 +36,8 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUn
   const std::size_t side = config.side;
   const bool enough = memory.first.size() == spectrum_size(config.side) &&
                       memory.second.size() == memory.first.size() && memory.rows.size() == Fft2::kBlock * side &&
-                      memory.lines.size() == 2 * (kFftLanes + 1) * side && memory.lowpass.size() == side;
+                      memory.lines.size() == 2 * (kFftLanes + 1) * side && memory.lowpass.size() == side &&
+                      memory.turns.size() == config.kept_turns * spectrum_size(config.side);
   if (!enough) {
     return Status::insufficient_memory;
   }
@@ -52,14 +53,33 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUn
   }
   config_ = config;
   memory_ = memory;
+  query_ = nullptr;
   margin_ = EdgeBlur::margin(config.side, config.edge_margin);
   fill_lowpass(config.lowpass_sigma, memory.lowpass);
+  weigh_filter();
+  return Status::ok;
+}
+
+/// The sums over the low-pass that scale the surface to 1 for equal pictures, and tell its gradient's variance where
+/// all phases are random: (2 pi)^2 sum(fx^2 W^2) / sum(W)^2, W the product of the weights of both axes. Pictures differ
+/// by walls rather than by pixels, so fewer phases are independent: they grow with the side, not with its square
+/// (measured, tests/matcher_covariance_test.cpp).
+void Matcher::weigh_filter() {
+  constexpr double kIndependentLines = 64.0;
+  const std::size_t side = config_.side;
   double sum = 0.0;
-  for (const float weight : memory.lowpass) {
-    sum += static_cast<double>(weight);
+  double square_sum = 0.0;
+  double slope_sum = 0.0;
+  for (std::size_t i = 0; i < side; ++i) {
+    const auto weight = static_cast<double>(memory_.lowpass[i]);
+    const double radians = kTwoPi * static_cast<double>(std::min(i, side - i)) / static_cast<double>(side);
+    sum += weight;
+    square_sum += weight * weight;
+    slope_sum += weight * weight * radians * radians;
   }
   filter_scale_ = static_cast<float>(1.0 / (sum * sum));
-  return Status::ok;
+  const double lines = static_cast<double>(side) / kIndependentLines;
+  gradient_noise_ = std::max(1.0, lines) * slope_sum * square_sum / (sum * sum * sum * sum);
 }
 
 Status Matcher::begin_extract(Span<const std::uint8_t> obstacles, Span<const std::uint8_t> observed, Features& out) {
@@ -68,6 +88,9 @@ Status Matcher::begin_extract(Span<const std::uint8_t> obstacles, Span<const std
   assert(valid);
   stage_ = Stage::idle;
   out.ready = false;
+  if (out.image.data() == query_) {
+    query_ = nullptr;
+  }
   if (!valid) {
     return status_ = Status::invalid_argument;
   }
@@ -102,6 +125,13 @@ Status Matcher::begin_match(const Features& a, const Features& b, const MatchOpt
   stage_ = Stage::estimate_rotation;
   line_ = 0;
   return Status::ok;
+}
+
+void Matcher::keep_turned(const Features& b) {
+  stage_ = Stage::idle;
+  query_ = memory_.turns.empty() ? nullptr : b.image.data();
+  turns_ = 0;
+  std::fill(memory_.turn_place.begin(), memory_.turn_place.end(), std::uint16_t{0});
 }
 
 bool Matcher::step() {
@@ -142,9 +172,10 @@ std::size_t Matcher::lines_of(Stage stage) const {
       return side / 2 + 1;
     case Stage::filter_columns:
       return side / 2;
+    case Stage::locate_peak:
+      return peaks_.size();
     case Stage::describe_rotation:
     case Stage::estimate_rotation:
-    case Stage::locate_peak:
     case Stage::idle:
       break;
   }
@@ -172,7 +203,10 @@ void Matcher::run(Stage stage, std::size_t first, std::size_t count) {
     case Stage::surface_rows:
       return search_surface_rows(first, count);
     case Stage::locate_peak:
-      return locate_peak();
+      for (std::size_t i = first; i < first + count; ++i) {
+        locate_peak(peaks_[i]);
+      }
+      return;
     case Stage::describe_rotation:
     case Stage::estimate_rotation:
     case Stage::idle:
@@ -205,24 +239,25 @@ Matcher::Stage Matcher::after(Stage stage) {
       return Stage::idle;
     case Stage::estimate_rotation:
       rotation_index_ = 0;
-      return rotation_count() == 0 ? Stage::idle : Stage::turned_rows;
+      return rotation_count() == 0 ? Stage::idle : begin_rotation();
     case Stage::turned_rows:
       return Stage::turned_columns;
     case Stage::turned_columns:
+      keep_turn();
       return Stage::filter_columns;
     case Stage::filter_columns:
       half_turn_ = false;
-      peak_ = {};
+      begin_surface();
       return Stage::surface_rows;
     case Stage::surface_rows:
       return Stage::locate_peak;
     case Stage::locate_peak:
       if (!half_turn_) {
         half_turn_ = true;
-        peak_ = {};
+        begin_surface();
         return Stage::surface_rows;
       }
-      return ++rotation_index_ == rotation_count() ? Stage::idle : Stage::turned_rows;
+      return ++rotation_index_ == rotation_count() ? Stage::idle : begin_rotation();
     case Stage::idle:
       break;
   }

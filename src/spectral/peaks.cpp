@@ -88,4 +88,52 @@ PeakOffset peak_offset(const PeakWindow& window, int rows, const MatcherConfig& 
   return offset;
 }
 
+double fit_variance(const MatcherConfig& config, PeakKind kind) {
+  const bool sharp = kind == PeakKind::whitened;
+  if (config.peak_fit == PeakFit::gaussian) {
+    return sharp ? 0.005 : 0.0036;
+  }
+  if (config.com_radius == 0) {
+    return 1.0 / 12.0;
+  }
+  return sharp ? 0.01 : 0.05;
+}
+
+Curvature curvature(const PeakWindow& window, int rows) {
+  const auto at = [&](int dx, int dy) { return static_cast<double>(window.at(dx, dy)); };
+  Curvature c;
+  c.xx = 2.0 * at(0, 0) - at(-1, 0) - at(1, 0);
+  if (rows > 0) {
+    c.yy = 2.0 * at(0, 0) - at(0, -1) - at(0, 1);
+    c.xy = 0.25 * (at(1, -1) + at(-1, 1) - at(-1, -1) - at(1, 1));
+  }
+  return c;
+}
+
+namespace {
+
+/// variance(eigenvalue) on the eigenvectors of `h`: no angles are needed for two rows and columns.
+template <class Variance>
+PeakSpread on_eigenvectors(const Curvature& h, const Variance& variance) {
+  const double mean = 0.5 * (h.xx + h.yy);
+  const double half = 0.5 * (h.xx - h.yy);
+  const double radius = sqrt(half * half + h.xy * h.xy);
+  const double low = variance(mean - radius);
+  const double high = variance(mean + radius);
+  const double slope = radius > 0.0 ? 0.5 * (high - low) / radius : 0.0;
+  return {0.5 * (low + high) + slope * half, slope * h.xy, 0.5 * (low + high) - slope * half};
+}
+
+}  // namespace
+
+PeakSpread spread_by_gradient(const Curvature& curvature, double gradient_noise, double most) {
+  const double least = sqrt(gradient_noise) / most;
+  return on_eigenvectors(curvature, [=](double h) { return h > least ? gradient_noise / (h * h) : most * most; });
+}
+
+PeakSpread spread_by_noise(const Curvature& curvature, double noise, double most) {
+  const double least = noise / (most * most);
+  return on_eigenvectors(curvature, [=](double h) { return h > least ? noise / h : most * most; });
+}
+
 }  // namespace mellin

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 #include "mellin/core/span.hpp"
 #include "mellin/spectral/matcher_config.hpp"
@@ -53,5 +54,34 @@ struct PeakOffset {
 
 /// By config.peak_fit and com_radius. `rows`: radius of the window along y, 0 for a single row.
 PeakOffset peak_offset(const PeakWindow& window, int rows, const MatcherConfig& config);
+
+/// What a correlation was made of: whitened spectra have sharp peaks, correlation coefficients broad ones.
+enum class PeakKind : std::uint8_t { whitened, coefficient };
+
+/// Variance of a fitted position without any noise, pixels squared, from pictures being pixels and from what the fit
+/// leans to. That of the highest pixel is uniform, the others are as measured on drawn offices (tests/
+/// matcher_covariance_test.cpp holds the sum).
+double fit_variance(const MatcherConfig& config, PeakKind kind);
+
+/// Second differences of the correlation at its highest pixel, turned positive for a peak, per pixel squared.
+struct Curvature {
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
+};
+Curvature curvature(const PeakWindow& window, int rows);
+
+/// Covariance of a peak's position, pixels squared.
+struct PeakSpread {
+  double xx = 0.0;
+  double xy = 0.0;
+  double yy = 0.0;
+};
+/// A peak is where the gradient is 0. Noise whose gradient has the variance `gradient_noise` along each axis moves it
+/// by H^-1 times that gradient, H the curvature: covariance gradient_noise H^-2. Along a direction without curvature
+/// the deviation is `most`, and it is never more.
+PeakSpread spread_by_gradient(const Curvature& curvature, double gradient_noise, double most);
+/// For a correlation coefficient, whose noise has the spectrum of the signal: covariance noise H^-1.
+PeakSpread spread_by_noise(const Curvature& curvature, double noise, double most);
 
 }  // namespace mellin

@@ -295,8 +295,17 @@ void RotationEstimator::correlate_polar(std::size_t first, std::size_t count) {
 
 void RotationEstimator::correlate_scales(Fft2& fft, std::size_t first, std::size_t count) {
   const std::size_t side = config_.side;
-  for (std::size_t i = first * side; i < (first + count) * side; ++i) {
-    scratch_.surface[i] = cross(a_[i], b_[i]);
+  const std::size_t last = side / 2;
+  const auto cross_column = [&](std::size_t kx) {
+    for (std::size_t i = kx * side; i < (kx + 1) * side; ++i) {
+      scratch_.surface[i] = cross(a_[i], b_[i]);
+    }
+  };
+  for (std::size_t kx = first; kx < std::min(first + count, last); ++kx) {
+    cross_column(kx);
+  }
+  if (first == 0) {
+    cross_column(last);  // goes back with column 0
   }
   fft.inverse_columns(scratch_.surface, first, count);
 }
@@ -354,6 +363,7 @@ RotationPeak RotationEstimator::refined(Fft2& fft, std::size_t angle) const {
   if (!seeks_scale(config_)) {
     window.set_row(0, correlation, angle, radius);
     peak.angle_rad = (static_cast<double>(angle) + peak_offset(window, 0, config_).x) * step_rad;
+    peak.variance = static_cast<float>(variance(window, 0) * step_rad * step_rad);
     return peak;
   }
   const std::size_t side = config_.side;
@@ -368,7 +378,28 @@ RotationPeak RotationEstimator::refined(Fft2& fft, std::size_t angle) const {
   peak.scale =
       static_cast<float>(exp(-log(0.5 * static_cast<double>(side)) * (rows + offset.y) / static_cast<double>(side)));
   peak.angle_rad = (static_cast<double>(angle) + offset.x) * step_rad;
+  peak.variance = static_cast<float>(variance(window, radius) * step_rad * step_rad);
   return peak;
+}
+
+/// Of a peak's place along the angle, steps squared: what is not explained by the other picture is taken for noise.
+/// Pictures differ by walls, and a wall is a ray through all rings: its noise is independent from angle to angle but
+/// hardly from ring to ring, so that a few rings' worth of magnitudes count (tests/matcher_covariance_test.cpp).
+double RotationEstimator::variance(const PeakWindow& window, int rows) const {
+  constexpr double kIndependentRings = 6.0;
+  constexpr double kIndependentRows = 10.0;
+  const auto side = static_cast<double>(config_.side);
+  const double most = 0.25 * side;
+  const Curvature h = curvature(window, rows);
+  if (by_rings()) {
+    const double r = std::min(static_cast<double>(window.at(0, 0)), 1.0);
+    const double noise = (1.0 - r * r) / (r * kIndependentRings * side);
+    return spread_by_noise({h.xx, 0.0, h.xx}, noise, most).xx + fit_variance(config_, PeakKind::coefficient);
+  }
+  // Random phases of equal weight, up to half a cycle a step.
+  const double gradient_noise = kPi * kPi / 3.0 / (kIndependentRows * side);
+  const Curvature along = rows > 0 ? h : Curvature{h.xx, 0.0, h.xx};
+  return spread_by_gradient(along, gradient_noise, most).xx + fit_variance(config_, PeakKind::whitened);
 }
 
 }  // namespace mellin

@@ -21,10 +21,18 @@ def edge_blurred(a, margin):
     return keep * a + (1 - keep) * soft
 
 
-def digest(cells, side):
+PREPROCESSING = dict(none=lambda a: a, erosion=lambda a: cv2.dilate(a, np.ones((3, 3))),
+                     blur=lambda a: cv2.GaussianBlur(a, (9, 9), 1))
+
+
+def digest(cells, side, preprocessing='erosion'):
+    prepare = PREPROCESSING[preprocessing]
     a = np.where(cells == 255, 0, cells / 254.).astype(np.float64)
+    if len(a) == side:
+        a = prepare(a)
+        return a / a.max()
     while len(a) > side:
-        a = cv2.resize(cv2.dilate(a, np.ones((3, 3))), None, fx=.5, fy=.5, interpolation=cv2.INTER_AREA)
+        a = cv2.resize(prepare(a), None, fx=.5, fy=.5, interpolation=cv2.INTER_AREA)
         a /= a.max()
     return a
 
@@ -67,53 +75,103 @@ def bilinear(a, x, y, beyond):
     return ndimage.map_coordinates(a, [y, x], order=1, mode=beyond)
 
 
-def features(picture):
+def high_passed(magnitude, kind):
+    n = len(magnitude)
+    f = np.fft.fftfreq(n)
+    if kind == 'reddy':
+        x = np.outer(np.cos(np.pi * f), np.cos(np.pi * f))
+        return magnitude * (1 - x) * (2 - x)
+    return magnitude * (np.hypot(f[:, None], f[None, :]) * n if kind == 'radius' else 1)
+
+
+def whitened(spectrum):
+    """Phases; a thousandth of the mean magnitude (of the half that a real transform stores) is added to magnitudes."""
+    floor = 1e-3 * np.abs(spectrum[:, :len(spectrum) // 2 + 1]).mean()
+    return spectrum / (np.abs(spectrum) + floor), floor
+
+
+def features(picture, mode='rings', high_pass='radius'):
     n = len(picture)
     a = edge_blurred(picture / 255., max(2, int(n * np.float32(.04))))
     full = np.fft.fft2(a)
-    half = full[:, :n // 2 + 1]
-    floor = 1e-3 * np.abs(half).mean()
-    f = np.fft.fftfreq(n) * n
-    weighted = np.abs(full) * np.hypot(f[:, None], f[None, :])
-    angle = -np.pi / 2 + np.arange(n) * np.pi / n
-    radius = np.arange(1, n // 2 + 1)
+    white, floor = whitened(full)
+    weighted = high_passed(np.abs(full), high_pass)
+    i = np.arange(n)
+    angle = -np.pi / 2 + i * (2 if 'log' in mode else 1) * np.pi / n
+    radius = dict(rings=np.arange(1, n // 2 + 1), linear_polar=(i + 1) / 2).get(mode, (n / 2) ** (i / n))
     # Frequency (0, 0) in the middle of a picture twice periodic, so that no sample lies outside.
     tiled = np.tile(np.roll(weighted, (n // 2, n // 2), (0, 1)), (2, 2))
     x, y = radius[:, None] * np.cos(angle), radius[:, None] * np.sin(angle)
-    rings = bilinear(tiled, x + n // 2, y + n // 2 + n * (y < 0), 'nearest')
-    rings -= rings.mean(1, keepdims=True)
-    return dict(a=a, white=full / (np.abs(full) + floor), floor=floor, rings=rings / np.sqrt((rings ** 2).sum()))
+    polar = bilinear(tiled, x + n // 2 + n * (x < 0), y + n // 2 + n * (y < 0), 'nearest')
+    if mode == 'rings':
+        polar -= polar.mean(1, keepdims=True)
+        polar /= np.sqrt((polar ** 2).sum())
+    else:
+        # Real spectra are halved along the last axis: the angle, as in the library, so the mean is the same one.
+        polar = whitened(np.fft.fft2(polar))[0]
+    return dict(a=a, white=white, floor=floor, polar=polar, mode=mode)
 
 
-def centre_of_mass(q, *at):
-    """The position of the maximum `at`, refined over its 3 ^ dim neighbours."""
-    d = np.arange(-1, 2)
-    box = np.maximum(q[np.ix_(*[(i + d) % len(q) for i in at])], 0)
+def centre_of_mass(q, *at, radius=1):
+    """The position of the maximum `at`, refined over the neighbours within `radius` on each axis."""
+    d = np.arange(-radius, radius + 1)
+    box = np.maximum(q[np.ix_(*[(i + d) % n for i, n in zip(at, q.shape)])], 0)
     return [i + (box.sum(tuple(k for k in range(q.ndim) if k != axis)) @ d) / box.sum() for axis, i in enumerate(at)]
 
 
-def match(f, g):
+def gaussian(q, *at):
+    """The same by a parabola through the logarithms, axis by axis; by the centre of mass where there are none."""
+    out = centre_of_mass(q, *at)
+    for axis, i in enumerate(at):
+        values = [q[tuple((k + d * (m == axis)) % q.shape[m] for m, k in enumerate(at))] for d in (-1, 0, 1)]
+        if min(values) > 0:
+            out[axis] = i - np.polyfit([-1, 0, 1], np.log(values), 2)[1] / 2 / np.polyfit([-1, 0, 1], np.log(values), 2)[0]
+    return out
+
+
+def rotations(f, g, share, fit):
+    """(angle, scale, strength), strongest first."""
     n = len(f['a'])
-    # Cyclic cross-correlation of all rings, written out: B turned on by k steps looks like A.
-    q = np.array([(f['rings'] * np.roll(g['rings'], k, 1)).sum() for k in range(n)])
-    peaks = [i for i in range(n) if q[i] >= .5 * q.max() and q[i] >= max(q[(i + d) % n] for d in (-2, -1, 1, 2))]
+    if f['mode'] == 'rings':
+        # Cyclic cross-correlation of all rings, written out: B turned on by k steps looks like A.
+        surface = np.array([[(f['polar'] * np.roll(g['polar'], k, 1)).sum() for k in range(n)]])
+    else:
+        surface = np.fft.ifft2(f['polar'] * np.conj(g['polar'])).real * (2 if 'log' in f['mode'] else 1)
+        if f['mode'] != 'log_polar_scale':
+            surface = surface[:1]
+    count = n // 2 if 'log' in f['mode'] else n
+    surface = surface[:, :count]
+    q = surface.max(0)
+    peaks = [i for i in range(count) if q[i] >= share * q.max() and q[i] >= max(q[(i + d) % count] for d in (-2, -1, 1, 2))]
+    for i in sorted(peaks, key=lambda k: -q[k])[:6]:
+        row = int(np.argmax(surface[:, i]))
+        if len(surface) == 1:
+            yield fit(q, i)[0] * np.pi / count, 1, q[i]
+        else:
+            # Out of half the angles: the surface's own period.
+            y, x = fit(surface, row, i)
+            yield x * np.pi / count, (n / 2) ** (-(y - n * (row >= n / 2)) / n), q[i]
+
+
+def match(f, g, share=.5, low_pass=.25, fit=centre_of_mass):
+    n = len(f['a'])
     frequency = np.fft.fftfreq(n)
-    low = np.exp(-.5 * (frequency[:, None] ** 2 + frequency[None, :] ** 2) / .25 ** 2)
+    low = np.exp(-.5 * (frequency[:, None] ** 2 + frequency[None, :] ** 2) / low_pass ** 2)
     centre = (n - 1) / 2
     y, x = np.mgrid[0:n, 0:n] - centre
     result = []
-    for i in sorted(peaks, key=lambda k: -q[k])[:6]:
+    for angle, scale, strength in rotations(f, g, share, fit):
         for half in (0, np.pi):
-            beta = centre_of_mass(q, i)[0] * np.pi / n + half
-            c, s = np.cos(beta), np.sin(beta)
+            beta = angle + half
+            c, s = np.cos(beta) / scale, np.sin(beta) / scale
             padded = np.pad(g['a'], 1)
             turned = bilinear(padded, c * x + s * y + centre + 1, -s * x + c * y + centre + 1, 'constant')
             spectrum = np.fft.fft2(turned)
             white = spectrum / (np.abs(spectrum) + g['floor'])
             surface = np.fft.ifft2(f['white'] * np.conj(white) * low).real * n * n / low.sum()
             top = np.unravel_index(np.argmax(surface), surface.shape)
-            ty, tx = [(v + n / 2) % n - n / 2 for v in centre_of_mass(surface, *top)]
-            result.append((tx, ty, (beta + np.pi) % (2 * np.pi) - np.pi, surface[top], q[i]))
+            ty, tx = [(v + n / 2) % n - n / 2 for v in fit(surface, *top)]
+            result.append((tx, ty, (beta + np.pi) % (2 * np.pi) - np.pi, surface[top], strength, scale))
     return sorted(result, key=lambda h: -h[3])
 
 
@@ -139,13 +197,28 @@ cells[rng.random((32, 32)) < .3] = 255
 cells[8:16, 4:20] = np.where(cells[8:16, 4:20] == 255, 255, cells[8:16, 4:20] % 90)
 cells[20:27, 20:] = 255
 octets('kCells', cells)
-floats('kDigest', digest(cells, 8))
+for name in PREPROCESSING:
+    floats('kDigest' + name.capitalize(), digest(cells, 8, name))
+    floats('kFull' + name.capitalize(), digest(cells, 32, name))
 octets('kObserved', np.packbits(masks(cells, 8)[0].ravel(), bitorder='little'))
 octets('kFree', np.packbits(masks(cells, 8)[1].ravel(), bitorder='little'))
 a, b = rooms(48, 0, 0, 0, 7), rooms(48, np.radians(52), 3.3, -2.6, 2)
 octets('kPictureA', a)
 octets('kPictureB', b)
-print('/// x [pixels], y [pixels], theta [rad], peak, rotation peak; best first.')
-for row in [match(features(a), features(b))]:
-    print(f'inline constexpr double kHypotheses[][5] = {{' + ', '.join('{' + ', '.join(f'{v:.6f}' for v in h) + '}' for h in row) + '};')
+print('/// x [pixels], y [pixels], theta [rad], peak, rotation peak, scale; best first.')
+
+
+def hypotheses(name, rows):
+    text = ', '.join('{' + ', '.join(f'{v:.6f}' for v in h) + '}' for h in rows)
+    print(f'inline constexpr double {name}[][6] = {{{text}}};')
+
+
+def run(mode='rings', high_pass='radius', **options):
+    return match(features(a, mode, high_pass), features(b, mode, high_pass), **options)
+
+
+hypotheses('kHypotheses', run())
+hypotheses('kLinearPolar', run('linear_polar', 'none', fit=lambda q, *at: centre_of_mass(q, *at, radius=2)))
+hypotheses('kLogPolar', run('log_polar', 'radius', fit=gaussian))
+hypotheses('kPaper', run('log_polar_scale', 'reddy', share=.9, low_pass=1e9))
 print('\n}  // namespace golden\n// clang-format on')

@@ -1,5 +1,6 @@
 #include "host/settings.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <fstream>
@@ -9,6 +10,24 @@
 
 namespace mellin::host {
 namespace {
+
+/// The fields of a spectral matcher that a profile may set; side and pixel follow from the grids.
+template <class C, class Visit>
+void visit_matcher(const std::string& prefix, C& c, Visit& visit) {
+  visit((prefix + "rotation").c_str(), c.rotation);
+  visit((prefix + "high_pass").c_str(), c.high_pass);
+  visit((prefix + "preprocessing").c_str(), c.preprocessing);
+  visit((prefix + "peak_fit").c_str(), c.peak_fit);
+  visit((prefix + "com_radius").c_str(), c.com_radius);
+  visit((prefix + "peak_share").c_str(), c.peak_share);
+  visit((prefix + "max_peaks").c_str(), c.max_peaks);
+  visit((prefix + "min_peak").c_str(), c.min_peak);
+  visit((prefix + "lowpass_sigma").c_str(), c.lowpass_sigma);
+  visit((prefix + "translation_peaks").c_str(), c.translation_peaks);
+  visit((prefix + "free_weight").c_str(), c.free_weight);
+  visit((prefix + "turns_per_bin").c_str(), c.turns_per_bin);
+  visit((prefix + "kept_turns").c_str(), c.kept_turns);
+}
 
 /// Calls visit(name, field) for each setting. Fields that resolved() overwrites are not among them.
 template <class C, class Visit>
@@ -80,15 +99,11 @@ void visit_settings(C& c, Visit&& visit) {
   visit("submaps.max_drift_rad", c.submaps.max_drift_rad);
   visit("submaps.min_scans", c.submaps.min_scans);
   visit("submaps.band_rows", c.submaps.band_rows);
-  visit("screening.peak_share", c.screening.matcher.peak_share);
-  visit("screening.max_peaks", c.screening.matcher.max_peaks);
-  visit("screening.free_weight", c.screening.matcher.free_weight);
+  visit_matcher("screening.", c.screening.matcher, visit);
   visit("screening.verified", c.screening.verified);
   visit("screening.cache_features", c.screening.cache_features);
   visit("screening.hold_digests", c.screening.hold_digests);
-  visit("registration.peak_share", c.registration.matcher.peak_share);
-  visit("registration.max_peaks", c.registration.matcher.max_peaks);
-  visit("registration.free_weight", c.registration.matcher.free_weight);
+  visit_matcher("registration.", c.registration.matcher, visit);
   visit("registration.aligned", c.registration.aligned);
   visit("registration.aligned_share", c.registration.aligned_share);
   visit("registration.aligned_from", c.registration.aligned_from);
@@ -126,6 +141,12 @@ void visit_settings(C& c, Visit&& visit) {
   visit("graph.max_fill", c.collection.graph.max_fill);
 }
 
+/// The names of an enumeration's values, in order.
+std::vector<std::string> names_of(RotationMode) { return {"rings", "linear_polar", "log_polar", "log_polar_scale"}; }
+std::vector<std::string> names_of(HighPass) { return {"none", "radius", "reddy"}; }
+std::vector<std::string> names_of(PeakFit) { return {"centre_of_mass", "gaussian"}; }
+std::vector<std::string> names_of(Preprocessing) { return {"none", "erosion", "blur"}; }
+
 template <class T>
 void parse(const std::string& key, const std::string& value, T& field) {
   const auto refuse = [&](const std::string& expected) {
@@ -141,6 +162,17 @@ void parse(const std::string& key, const std::string& value, T& field) {
     } else {
       refuse("true or false");
     }
+  } else if constexpr (std::is_enum_v<T>) {
+    const std::vector<std::string> names = names_of(T{});
+    const auto at = std::find(names.begin(), names.end(), value);
+    if (at == names.end()) {
+      std::string all;
+      for (const std::string& name : names) {
+        all += (all.empty() ? "" : ", ") + name;
+      }
+      refuse("one of " + all);
+    }
+    field = static_cast<T>(at - names.begin());
   } else if constexpr (std::is_integral_v<T>) {
     std::uint64_t number = 0;
     const auto [end, error] = std::from_chars(first, last, number);
@@ -227,6 +259,8 @@ std::vector<std::pair<std::string, ConfigValue>> list_settings(const Config& con
     using T = std::decay_t<decltype(field)>;
     if constexpr (std::is_same_v<T, bool>) {
       out.emplace_back(name, field);
+    } else if constexpr (std::is_enum_v<T>) {
+      out.emplace_back(name, names_of(field).at(static_cast<std::size_t>(field)));
     } else if constexpr (std::is_integral_v<T>) {
       out.emplace_back(name, static_cast<std::int64_t>(field));
     } else {

@@ -19,7 +19,7 @@ struct PlaceHypothesis {
   Sym3 covariance;            ///< of a_T_b over (x, y in a's frame, theta); from registration only
   float peak = 0.0F;          ///< strength of the match, 0 to 1
   float agreement = 0.0F;     ///< of what both observed, 0 to 1; after registration times inlier_share
-  float overlap = 0.0F;       ///< shared observed area over the smaller one
+  float overlap = 0.0F;       ///< shared observed area over the smaller one; from registration only
   float inlier_share = 0.0F;  ///< of the aligned points; from registration only
 };
 

@@ -72,7 +72,7 @@ class SpectralRegistration final : public GridMatcher {
 
  private:
   static constexpr std::size_t scratch_size(const RegistrationConfig& config) {
-    return DigestMaker::scratch_size(config.grid_side, config.matcher.side);
+    return DigestMaker::scratch_size(config.grid_side, config.matcher.side, config.matcher.preprocessing);
   }
   /// Pictures are made before anything is aligned; only what alignment keeps from pair to pair stands in the way.
   template <class W>

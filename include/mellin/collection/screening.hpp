@@ -40,6 +40,8 @@ class SpectralScreening final : public DigestMatcher {
     Matcher::Memory matcher;
     Span<std::uint8_t> classes_a;
     Span<std::uint8_t> classes_b;
+    Span<ClassCell> obstacles_a;
+    Span<ClassCell> obstacles_b;
     Span<float> scratch;  ///< for making digests
   };
 
@@ -76,6 +78,8 @@ class SpectralScreening final : public DigestMatcher {
     m.matcher = Matcher::carve(kept, work, config.matcher);
     m.classes_a = work.template take<std::uint8_t>(pixels, Part::spectral);
     m.classes_b = work.template take<std::uint8_t>(pixels, Part::spectral);
+    m.obstacles_a = work.template take<ClassCell>(pixels, Part::spectral);
+    m.obstacles_b = work.template take<ClassCell>(pixels, Part::spectral);
     m.scratch = work.template take<float>(scratch_size(config), Part::spectral);
     return m;
   }
@@ -98,7 +102,7 @@ class SpectralScreening final : public DigestMatcher {
   static constexpr std::uint32_t kNone = 0xFFFFFFFFU;
 
   static constexpr std::size_t scratch_size(const ScreeningConfig& config) {
-    return DigestMaker::scratch_size(config.grid_side, config.matcher.side);
+    return DigestMaker::scratch_size(config.grid_side, config.matcher.side, config.matcher.preprocessing);
   }
   bool holds(std::uint32_t index) const;
   DigestOut digest_out(std::uint32_t index) const;
@@ -106,7 +110,7 @@ class SpectralScreening final : public DigestMatcher {
   void begin_caching(std::uint32_t index);
   void begin_features(std::uint32_t index, Features& out, Stage stage);
   void begin_match();
-  ClassView classes(std::uint32_t index, Span<std::uint8_t> out);
+  ClassObstacles classes(std::uint32_t index, Span<std::uint8_t> out, Span<ClassCell> cells);
   void verify_one();
 
   ScreeningConfig config_;
@@ -119,12 +123,13 @@ class SpectralScreening final : public DigestMatcher {
   std::uint32_t described_ = kNone;     ///< whose digest is held in the second place, unless all are …
   std::uint32_t restored_ = kNone;      ///< … and in the first
   std::uint32_t featured_b_ = kNone;    ///< whose features features_b_ holds
+  std::uint32_t kept_b_ = kNone;        ///< whose turned spectra the matcher keeps
   std::uint32_t classified_b_ = kNone;  ///< whose classes classes_b holds
   Features features_a_;                 ///< while they are cached, those under way
   Features features_b_;
   std::size_t verify_next_ = 0;
-  ClassView class_a_;
-  ClassView class_b_;
+  ClassObstacles class_a_;
+  ClassObstacles class_b_;
   PlaceHypotheses hypotheses_;
 };
 

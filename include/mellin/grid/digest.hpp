@@ -8,6 +8,7 @@
 #include "mellin/core/arena.hpp"
 #include "mellin/core/span.hpp"
 #include "mellin/core/status.hpp"
+#include "mellin/grid/row_blur.hpp"
 #include "mellin/grid/submap.hpp"
 
 namespace mellin {
@@ -56,21 +57,28 @@ enum class Preprocessing : std::uint8_t {
   blur      ///< Gaussian, standard deviation one cell, blur() in image.hpp
 };
 
-/// Makes a digest, or the picture that the matcher registers, from a submap's grid: obstacles are thickened by a cell,
-/// the picture halved and normalised, again and again until it has the wanted side (paper, Sections IV-B2 and V-A). At
-/// the grid's own side they are thickened and normalised.
+/// Makes a digest, or the picture that the matcher registers, from a submap's grid: it is preprocessed (by default
+/// obstacles are thickened by a cell), halved and normalised, again and again until it has the wanted side (paper,
+/// Sections IV-B2 and V-A). At the grid's own side it is preprocessed and normalised.
 class DigestMaker {
  public:
-  /// Floats of scratch that begin() needs: a picture of half the grid's side, none where nothing is halved.
-  static constexpr std::size_t scratch_size(std::uint16_t grid_side, std::uint16_t digest_side) {
-    return digest_side == grid_side ? 0 : std::size_t{grid_side} * grid_side / 4;
+  /// Floats of scratch that begin() needs: a picture of half the grid's side, none where nothing is halved; to blur,
+  /// ten rows and one of the grid beside it.
+  static constexpr std::size_t scratch_size(std::uint16_t grid_side, std::uint16_t digest_side,
+                                            Preprocessing preprocessing = Preprocessing::erosion) {
+    const std::size_t picture = digest_side == grid_side ? 0 : std::size_t{grid_side} * grid_side / 4;
+    const std::size_t factor = digest_side == grid_side ? 1 : 2;
+    return picture + (preprocessing == Preprocessing::blur ? RowBlur::scratch_size(grid_side, factor) : 0);
   }
 
   /// Starts on `grid`; grid, scratch and out must live until step() is done.
-  /// invalid_argument: sizes do not hold, or the grid's side is not the digest's times a power of two.
-  Status begin(const GridView& grid, Span<float> scratch, const DigestOut& out);
+  /// invalid_argument: sizes do not hold, or the grid's side is not the digest's times a power of two, or what is to be
+  /// blurred has less than six rows.
+  Status begin(const GridView& grid, Span<float> scratch, const DigestOut& out,
+               Preprocessing preprocessing = Preprocessing::erosion);
   /// Treats up to `lines` rows, of the grid's cells under two rows of its first half, or under a row of the digest for
-  /// the masks: at most grid side * max(4, grid side / digest side) cells a row; true when done.
+  /// the masks: at most grid side * max(4, grid side / digest side) cells a row, 6 grid side where it is blurred, each
+  /// cell ten times; true when done.
   bool step(std::size_t lines);
 
  private:
@@ -82,10 +90,17 @@ class DigestMaker {
   void first_row(std::size_t row);
   void halve_row(std::size_t row);
   void write_row(std::size_t row);
+  template <class Read>
+  void preprocess_and_halve(const Read& read, std::size_t side, std::size_t row);
+  const float* blurred_full_row(std::size_t row);
+  float thickened(std::size_t column, std::size_t row) const;
 
   GridView grid_;
   DigestOut out_;
-  Span<float> scratch_;
+  Span<float> picture_;
+  Span<float> blur_scratch_;
+  Preprocessing preprocessing_ = Preprocessing::erosion;
+  RowBlur row_blur_;
   Stage stage_ = Stage::done;
   std::size_t row_ = 0;     // next row of the stage
   std::uint16_t side_ = 0;  // of the picture that the stage makes
@@ -93,6 +108,7 @@ class DigestMaker {
 };
 
 /// All of it at once. Status as DigestMaker::begin(). Time: some ten operations a cell.
-Status make_digest(const GridView& grid, Span<float> scratch, const DigestOut& out);
+Status make_digest(const GridView& grid, Span<float> scratch, const DigestOut& out,
+                   Preprocessing preprocessing = Preprocessing::erosion);
 
 }  // namespace mellin

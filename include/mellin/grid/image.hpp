@@ -9,6 +9,7 @@
 
 #include "mellin/core/span.hpp"
 #include "mellin/core/status.hpp"
+#include "mellin/grid/row_blur.hpp"
 #include "mellin/grid/submap.hpp"
 
 namespace mellin {
@@ -38,8 +39,9 @@ Status thicken(const ImageView& in, const ImageView& out);
 
 /// Gaussian blur with a standard deviation of one pixel, kernel cut at four, mirrored at the border without repeating
 /// the outermost pixel; the paper's alternative to erosion (Section IV-B2). `out` is another image of the same side;
-/// `line` holds at least side floats. invalid_argument: sizes differ, or a side below 5.
-Status blur(const ImageView& in, const ImageView& out, Span<float> line);
+/// `scratch` holds at least RowBlur::scratch_size(side, 1) floats. invalid_argument: sizes differ, or a side below
+/// RowBlur::kMinSide.
+Status blur(const ImageView& in, const ImageView& out, Span<float> scratch);
 
 /// Means of 2 x 2 pixels. `out` has half the side and may start where `in` starts. invalid_argument: sizes.
 Status halve(const ImageView& in, const ImageView& out);

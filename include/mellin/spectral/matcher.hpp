@@ -23,8 +23,18 @@
 #include "mellin/spectral/fft2.hpp"
 #include "mellin/spectral/matcher_config.hpp"
 #include "mellin/spectral/rotation.hpp"
+#include "mellin/spectral/surface_peaks.hpp"
 
 namespace mellin {
+
+/// Covariance of a registered pose from the shapes of its correlation peaks: x and y m^2, theta rad^2, theta taken for
+/// independent of the place.
+struct PeakCovariance {
+  float xx = 0.0F;
+  float xy = 0.0F;
+  float yy = 0.0F;
+  float tt = 0.0F;
+};
 
 /// Where b may lie in a.
 struct Hypothesis {
@@ -32,10 +42,13 @@ struct Hypothesis {
   float peak = 0.0F;           ///< of the phase-only filter: 1 for equal pictures, near 0 for unrelated ones
   float rotation_peak = 0.0F;  ///< of the correlation that gave the rotation: 1 for equal pictures, over 0
   float scale = 1.0F;          ///< b enlarged by it about its origin, then moved by a_T_b, looks like a
+  PeakCovariance covariance;   ///< of a_T_b, from noise only: a wrong hypothesis may have a small one
 };
 
+/// Of one match; the lowest peaks drop out.
+inline constexpr std::size_t kMaxMatchHypotheses = 32;
 /// Best first.
-using HypothesisList = FixedList<Hypothesis, 2 * kMaxRotationPeaks>;
+using HypothesisList = FixedList<Hypothesis, kMaxMatchHypotheses>;
 
 /// What may differ from match to match.
 struct MatchOptions {
@@ -53,6 +66,8 @@ class Matcher {
     Span<Complex> lines;   ///< twice kFftLanes columns of a spectrum and one more
     Span<float> lowpass;   ///< along one axis
     RotationEstimator::Memory rotation;
+    Span<Complex> turns;             ///< spectra of the query, turned and whitened, MatcherConfig::kept_turns of them
+    Span<std::uint16_t> turn_place;  ///< of each angle: where in `turns`, from 1 on; 0: not there
   };
 
   template <class A>
@@ -71,6 +86,9 @@ class Matcher {
     m.lines = work.template take<Complex>(2 * (kFftLanes + 1) * side, Part::spectral, Region::fast);
     m.lowpass = tables.template take<float>(side, Part::spectral, Region::fast);
     m.rotation = RotationEstimator::carve(tables, work, config);
+    m.turns = work.template take<Complex>(config.kept_turns * spectrum_size(config.side), Part::spectral);
+    m.turn_place =
+        work.template take<std::uint16_t>(config.kept_turns > 0 ? side * config.turns_per_bin : 0, Part::spectral);
     return m;
   }
 
@@ -87,6 +105,10 @@ class Matcher {
   /// unfinished earlier job is given up. invalid_argument: sizes do not hold, or a has no filter, or b no image.
   /// degenerate: one of them is not ready; there are no hypotheses then.
   Status begin_match(const Features& a, const Features& b, const MatchOptions& options = {});
+
+  /// Names the query: from now on matches with `b`, told by where its image lies, keep its turned spectra for the next
+  /// one, until b is extracted anew or another query is named. Only where MatcherConfig::kept_turns is not 0.
+  void keep_turned(const Features& b);
 
   /// Does one pass, or lines_per_step lines of it, of the job. True when the job is done, or there is none.
   /// Costliest pass: the filtered columns of a turned picture, two FFTs a column.
@@ -127,6 +149,7 @@ class Matcher {
   void run(Stage stage, std::size_t first, std::size_t count);
   Stage after(Stage stage);
 
+  void weigh_filter();
   ImageView picture_image() const;
   void load_rows(std::size_t first, std::size_t count);
   void blur_edges(std::size_t first, std::size_t count);
@@ -134,11 +157,17 @@ class Matcher {
   void transform_picture_columns(std::size_t first, std::size_t count);
   void end_magnitudes();
   void whiten_columns(std::size_t first, std::size_t count);
+  Stage begin_rotation();
+  std::uint32_t turn_index() const;
+  double turned_angle() const;
+  float turn_variance() const;
+  void keep_turn();
   void transform_turned_rows(std::size_t first, std::size_t count);
   void whiten_turned_columns(std::size_t first, std::size_t count);
   void filter_turned_columns(std::size_t first, std::size_t count);
+  void begin_surface();
   void search_surface_rows(std::size_t first, std::size_t count);
-  void locate_peak();
+  void locate_peak(const Fft2::Peak& peak);
   /// Rotation peaks that are tried.
   std::size_t rotation_count() const;
   void add_hypothesis(const Hypothesis& hypothesis);
@@ -151,6 +180,7 @@ class Matcher {
   EdgeBlur edge_blur_;
   std::uint16_t margin_ = 0;
   float filter_scale_ = 1.0F;
+  double gradient_noise_ = 0.0;  // of a surface of random phases, along an axis, per pixel squared
 
   Stage stage_ = Stage::idle;
   std::size_t line_ = 0;  // next line of the stage
@@ -169,7 +199,11 @@ class Matcher {
   RotationEstimator rotation_;
   std::size_t rotation_index_ = 0;  // of its peaks, the one under way
   bool half_turn_ = false;          // looking at beta + 180 degrees
-  Fft2::Peak peak_;                 // of the correlation surface so far
+  const float* query_ = nullptr;    // image of the picture whose turned spectra are kept
+  std::size_t turns_ = 0;           // that are kept so far
+  Span<Complex> turned_;            // b under way: turned, in the end whitened too
+  SurfacePeaks peaks_;              // of the correlation surface so far
+  Fft2::Peak peak_;                 // the highest, where only that is asked for
   HypothesisList hypotheses_;
 };
 

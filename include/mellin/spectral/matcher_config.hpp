@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "mellin/grid/digest.hpp"
 #include "mellin/spectral/fft2.hpp"
 
 namespace mellin {
 
 inline constexpr std::size_t kMaxRotationPeaks = 6;
+inline constexpr std::size_t kMaxTranslationPeaks = 8;
 
 /// How the rotation is found from the magnitudes of the pictures' spectra (paper, Section IV-A step 2).
 enum class RotationMode : std::uint8_t {
@@ -47,6 +49,9 @@ struct MatcherConfig {
   /// At most so many rotation peaks are tried, strongest first (IV-B3): 1 … 6. Time is in proportion; each gives two
   /// hypotheses.
   std::uint8_t max_peaks = 6;
+  /// At most so many translation peaks of each turned picture become hypotheses, highest first: 1 … 8. The paper takes
+  /// one; more are worth it where what was observed is then asked which is right.
+  std::uint8_t translation_peaks = 1;
   /// Radius of the neighbourhood whose centre of mass is the peak's position (Eq. 3, CoM_r): 0 … 3 pixels.
   std::uint8_t com_radius = 1;
   /// Edge of a pixel, m: gives the hypotheses their unit.
@@ -62,6 +67,9 @@ struct MatcherConfig {
   /// Width of the margin that is blended into its cyclically blurred self (IV-A step 1), share of the side, over 0 up
   /// to 0.1.
   float edge_margin = 0.04F;
+  /// What makes the pictures of grids (IV-B2): for those who call DigestMaker; the matcher itself takes pictures as
+  /// they are.
+  Preprocessing preprocessing = Preprocessing::erosion;
   /// How the rotation is found (IV-A step 2). Costs of a comparison: rings least, log_polar_scale a 2D transform more.
   RotationMode rotation = RotationMode::rings;
   /// Weight of magnitudes before the rotation is sought (Fig. 1b).
@@ -75,6 +83,13 @@ struct MatcherConfig {
   /// and the unknown says nothing. 0 is the paper's way, which takes unobserved space for free (IV-B1). Without an
   /// observed mask it has no effect. 0 … 4.
   float free_weight = 1.0F;
+  /// b is turned by multiples of an angular bin (180 degrees / side) over this, which is the angle that a hypothesis
+  /// says then: 1 … 8; 0: by the very angle of the peak.
+  std::uint8_t turns_per_bin = 0;
+  /// Turned spectra of one picture, the query, that are kept between matches (Matcher::keep_turned()), at most
+  /// side * turns_per_bin: a spectrum's memory each. More than one picture is compared with it at half the cost. Has no
+  /// influence on the results. Only with turns_per_bin.
+  std::uint16_t kept_turns = 0;
   /// Lines (rows, columns, rings) that one step() treats; 0 means a whole pass.
   std::uint16_t lines_per_step = 0;
 };
@@ -83,11 +98,13 @@ struct MatcherConfig {
 constexpr bool is_valid(const MatcherConfig& config) {
   return is_fft_side(config.side) && config.pixel_m > 0.0F && config.pixel_m < 1e3F && config.peak_share >= 0.0F &&
          config.peak_share <= 1.0F && config.max_peaks >= 1 && config.max_peaks <= kMaxRotationPeaks &&
-         config.com_radius <= 3 && config.lowpass_sigma >= 0.0F && config.lowpass_sigma < 1e3F &&
-         config.whitening_floor > 0.0F && config.whitening_floor <= 1.0F && config.edge_margin > 0.0F &&
-         config.edge_margin <= 0.1F && config.rotation <= RotationMode::log_polar_scale &&
+         config.translation_peaks >= 1 && config.translation_peaks <= kMaxTranslationPeaks && config.com_radius <= 3 &&
+         config.lowpass_sigma >= 0.0F && config.lowpass_sigma < 1e3F && config.whitening_floor > 0.0F &&
+         config.whitening_floor <= 1.0F && config.edge_margin > 0.0F && config.edge_margin <= 0.1F &&
+         config.preprocessing <= Preprocessing::blur && config.rotation <= RotationMode::log_polar_scale &&
          config.high_pass <= HighPass::reddy && config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F &&
-         config.min_peak <= 1.0F && config.free_weight >= 0.0F && config.free_weight <= 4.0F;
+         config.min_peak <= 1.0F && config.free_weight >= 0.0F && config.free_weight <= 4.0F &&
+         config.turns_per_bin <= 8 && config.kept_turns <= config.side * config.turns_per_bin;
 }
 
 /// The paper taken at its word: phase-only matched filters without low-pass for rotation with scale and for

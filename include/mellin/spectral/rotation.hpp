@@ -27,10 +27,13 @@
 
 namespace mellin {
 
+class PeakWindow;
+
 struct RotationPeak {
   double angle_rad = 0.0;  ///< b turned by it, or by it and 180 degrees, looks like a; about 0 … 180 degrees
   float strength = 0.0F;   ///< of the correlation: 1 for equal pictures, over 0
   float scale = 1.0F;      ///< b enlarged by it looks like a; 1 where the mode holds it
+  float variance = 0.0F;   ///< of the angle, rad^2, from the peak's strength and curvature
 };
 
 /// Strongest first.
@@ -109,6 +112,7 @@ class RotationEstimator {
   void search_scales(Fft2& fft, std::size_t first, std::size_t count);
   void find_peaks(Fft2& fft);
   RotationPeak refined(Fft2& fft, std::size_t angle) const;
+  double variance(const PeakWindow& window, int rows) const;
 
   MatcherConfig config_;
   Memory memory_;
