@@ -192,9 +192,8 @@ std::vector<Pair> match_all(const std::vector<Submap>& submaps, std::uint16_t si
   for (const Submap& submap : submaps) {
     pictures.push_back(digest_of(submap, side));
     features.push_back(Features::carve(arena, config));
-    REQUIRE(matcher.extract({pictures.back().obstacles.data(), pictures.back().obstacles.size()},
-                            {pictures.back().observed.data(), pictures.back().observed.size()},
-                            features.back()) == Status::ok);
+    REQUIRE(matcher.extract({pictures.back().obstacles.data(), pictures.back().obstacles.size()}, features.back(),
+                            {pictures.back().observed.data(), pictures.back().observed.size()}) == Status::ok);
   }
   std::vector<Pair> pairs;
   for (std::size_t a = 0; a < submaps.size(); ++a) {

@@ -36,7 +36,7 @@ bool same_bits(const HypothesisList& a, const HypothesisList& b) {
 
 TEST_SUITE("matcher") {
   TEST_CASE("hypotheses equal those of a numpy implementation in double precision") {
-    const auto check = [](const char* name, const MatcherConfig& config, const auto& expected) {
+    const auto check = []([[maybe_unused]] const char* name, const MatcherConfig& config, const auto& expected) {
       CAPTURE(name);
       Bench bench(config);
       const HypothesisList found = bench.match(golden_picture(golden::kPictureA), golden_picture(golden::kPictureB));
