@@ -11,6 +11,7 @@
 #include "host/heap_arena.hpp"
 #include "host/simulator.hpp"
 #include "mellin/collection/screening.hpp"
+#include "mellin/config.hpp"
 #include "mellin/grid/digest.hpp"
 #include "mellin/spectral/matcher.hpp"
 
@@ -92,9 +93,8 @@ class Screening {
     config.grid_side = kGridSide;
     config.max_submaps = static_cast<std::uint32_t>(submaps.size());
     config.matcher = matcher_config(side, peaks);
-    config.matcher.turns_per_bin = 4;
-    config.matcher.kept_turns = static_cast<std::uint16_t>(4 * side);
-    config.verified = 2 * kMaxRotationPeaks;
+    config.matcher.turns_per_bin = desktop_profile().screening.matcher.turns_per_bin;
+    config.matcher.kept_turns = static_cast<std::uint16_t>(config.matcher.turns_per_bin * side);
     const SpectralScreening::Memory memory =
         memory_.carve([&config](auto& arena) { return SpectralScreening::carve(arena, config); });
     expect(screening_.init(config, memory) == Status::ok, "the screening was refused");
