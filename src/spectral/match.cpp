@@ -157,13 +157,19 @@ void Matcher::search_surface_rows(std::size_t first, std::size_t count) {
   }
 }
 
-/// Row `row` of the surface under way; valid until the next one.
-const float* Matcher::surface_row(std::size_t row) {
+/// Row `row` of the surface under way. Rows are asked for in ascending order, cyclically; `begins` says which is the
+/// first. Where there are lanes a block of rows takes no longer than one.
+const float* Matcher::surface_row(std::size_t row, bool begins) {
   if (config_.masked) {
     return masked_surface_row(row);
   }
-  fft_.inverse_rows(surface(), row, 1, memory_.rows.data());
-  return memory_.rows.data();
+  constexpr std::size_t kRows = kFftLanes > 1 ? Fft2::kBlock : 1;
+  const std::size_t side = config_.side;
+  if (begins || row < block_row_ || row >= block_row_ + kRows) {
+    block_row_ = std::min(row, side - kRows);
+    fft_.inverse_rows(surface(), block_row_, kRows, memory_.rows.data());
+  }
+  return memory_.rows.data() + (row - block_row_) * side;
 }
 
 /// A peak's place, refined, and the pose that it means.
@@ -175,7 +181,7 @@ void Matcher::locate_peak(const Fft2::Peak& peak) {
   const int radius = PeakWindow::radius_for(config_);
   PeakWindow window;
   for (int dy = -radius; dy <= radius; ++dy) {
-    window.set_row(dy, {surface_row(cyclic(peak.row, dy, side)), side}, peak.column, radius);
+    window.set_row(dy, {surface_row(cyclic(peak.row, dy, side), dy == -radius), side}, peak.column, radius);
   }
   const PeakOffset offset = peak_offset(window, radius, config_);
   // Turning pixel centres 0 … side - 1 by 180 degrees about their middle maps i to side - 1 - i, whereas the conjugate

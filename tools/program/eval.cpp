@@ -8,6 +8,7 @@ void add_eval(CLI::App& app) {
   eval->require_subcommand(1);
   add_eval_change(*eval);
   add_eval_registration(*eval);
+  add_eval_runtime(*eval);
   add_eval_screening(*eval);
 }
 

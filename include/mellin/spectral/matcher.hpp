@@ -197,7 +197,7 @@ class Matcher {
   Span<Complex> masked_sum(std::size_t i) const;
   void begin_surface();
   void search_surface_rows(std::size_t first, std::size_t count);
-  const float* surface_row(std::size_t row);
+  const float* surface_row(std::size_t row, bool begins);
   PeakSpread translation_spread(const PeakWindow& window, int radius) const;
   void locate_peak(const Fft2::Peak& peak);
   /// Rotation peaks that are tried.
@@ -233,6 +233,7 @@ class Matcher {
   bool half_turn_ = false;          // looking at beta + 180 degrees
   const float* query_ = nullptr;    // image of the picture whose turned spectra are kept
   std::size_t turns_ = 0;           // that are kept so far
+  std::size_t block_row_ = 0;       // first of the surface's rows that are at hand
   Span<Complex> turned_;            // b under way: turned, in the end whitened too
   SurfacePeaks peaks_;              // of the correlation surface so far
   Fft2::Peak peak_;                 // the highest, where only that is asked for
