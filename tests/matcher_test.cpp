@@ -39,7 +39,14 @@ TEST_SUITE("matcher") {
     const auto check = []([[maybe_unused]] const char* name, const MatcherConfig& config, const auto& expected) {
       CAPTURE(name);
       Bench bench(config);
-      const HypothesisList found = bench.match(golden_picture(golden::kPictureA), golden_picture(golden::kPictureB));
+      const Picture picture_a = golden_picture(golden::kPictureA);
+      const Picture picture_b = golden_picture(golden::kPictureB);
+      Features a = bench.carve();
+      Features b = bench.carve();
+      REQUIRE(bench.matcher.extract({picture_a.data(), picture_a.size()}, a, golden::kMaskA) == Status::ok);
+      REQUIRE(bench.matcher.extract({picture_b.data(), picture_b.size()}, b, golden::kMaskB) == Status::ok);
+      REQUIRE(bench.matcher.match(a, b) == Status::ok);
+      const HypothesisList& found = bench.matcher.hypotheses();
       REQUIRE(found.size() == std::size(expected));
       for (std::size_t i = 0; i < found.size(); ++i) {
         CHECK(found[i].a_T_b.x == doctest::Approx(expected[i][0]).epsilon(1e-3));
@@ -50,8 +57,10 @@ TEST_SUITE("matcher") {
         CHECK(static_cast<double>(found[i].scale) == doctest::Approx(expected[i][5]).epsilon(1e-4));
       }
     };
-    check("rings", config_of(48), golden::kHypotheses);
-    MatcherConfig linear = config_of(48);
+    MatcherConfig rings = config_of(48);
+    rings.peak_fit = PeakFit::centre_of_mass;
+    check("rings", rings, golden::kHypotheses);
+    MatcherConfig linear = rings;
     linear.rotation = RotationMode::linear_polar;
     linear.high_pass = HighPass::none;
     linear.com_radius = 2;
@@ -60,6 +69,9 @@ TEST_SUITE("matcher") {
     logarithmic.rotation = RotationMode::log_polar;
     logarithmic.peak_fit = PeakFit::gaussian;
     check("log-polar", logarithmic, golden::kLogPolar);
+    MatcherConfig masked = rings;
+    masked.masked = true;
+    check("masked", masked, golden::kMasked);
     MatcherConfig paper = paper_matcher(48);
     paper.pixel_m = 1.0F;
     check("the paper's", paper, golden::kPaper);
@@ -383,6 +395,7 @@ TEST_SUITE("matcher") {
       MatcherConfig config = config_of(96, 0.4F);
       config.lowpass_sigma = variant == 0 ? 0.0F : 0.25F;
       config.high_pass = variant == 1 ? HighPass::none : HighPass::radius;
+      config.peak_fit = variant < 2 ? PeakFit::gaussian : PeakFit::centre_of_mass;
       config.com_radius = static_cast<std::uint8_t>(variant == 2 ? 0 : (variant == 3 ? 3 : 1));
       Bench bench(config);
       const Pose2 a_T_b{1.7, -2.2, 2.5};

@@ -30,6 +30,9 @@ void Matcher::load_rows(std::size_t first, std::size_t count) {
     highest_ = std::max(highest_, value);
     image.pixels[i] = static_cast<float>(value) / 255.0F;
   }
+  for (std::size_t r = first; r < first + count; ++r) {
+    add_curvature(r);
+  }
   if (observed_.empty() || config_.masked || !(config_.free_weight > 0.0F)) {
     return;
   }
@@ -52,45 +55,37 @@ void Matcher::transform_picture_rows(std::size_t first, std::size_t count) {
   for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
     fft_.forward_rows(image.row(r), r, std::min(Fft2::kBlock, first + count - r), memory_.first);
   }
-  for (std::size_t r = first; r < first + count; ++r) {
-    add_curvature(r);
-  }
 }
 
-/// What a row and those beside it add to the picture's correlation with itself: cyclic, as the transform is.
+/// What a row and those beside it add to the picture's correlation with itself, in whole numbers: exact in any order.
 void Matcher::add_curvature(std::size_t row) {
-  const ImageView image = picture_image();
-  const std::size_t side = image.side;
-  const float* const here = image.row(row);
-  const float* const above = image.row(row + 1 == side ? 0 : row + 1);
-  const float* const below = image.row(row == 0 ? side - 1 : row - 1);
-  // Lanes without order between them, so that the compiler may take them side by side; sides are even.
-  constexpr std::size_t kLanes = 8;
-  float lanes[5][kLanes] = {};
-  const auto add = [&](std::size_t c, std::size_t left, std::size_t right, std::size_t lane) {
-    const float dx = here[right] - here[c];
-    const float dy = above[c] - here[c];
-    lanes[0][lane] += here[c];
-    lanes[1][lane] += here[c] * here[c];
-    lanes[2][lane] += dx * dx;
-    lanes[3][lane] += dy * dy;
-    lanes[4][lane] += 0.25F * (here[right] - here[left]) * (above[c] - below[c]);
-  };
-  add(0, side - 1, 1, 0);
-  std::size_t c = 1;
-  for (; c + kLanes < side; c += kLanes) {
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
-      add(c + lane, c + lane - 1, c + lane + 1, lane);
-    }
+  const std::size_t side = config_.side;
+  const std::uint8_t* const here = picture_.data() + row * side;
+  const std::uint8_t* const above = row + 1 < side ? here + side : here;
+  const std::uint8_t* const below = row > 0 ? here - side : here;
+  std::int32_t sum = 0;
+  std::int32_t square = 0;
+  std::int32_t along_y = 0;
+  for (std::size_t c = 0; c < side; ++c) {
+    const std::int32_t dy = above[c] - here[c];
+    sum += here[c];
+    square += here[c] * here[c];
+    along_y += dy * dy;
   }
-  for (; c < side; ++c) {
-    add(c, c - 1, c + 1 == side ? 0 : c + 1, 0);
+  std::int32_t along_x = 0;
+  for (std::size_t c = 0; c + 1 < side; ++c) {
+    const std::int32_t dx = here[c + 1] - here[c];
+    along_x += dx * dx;
   }
-  for (std::size_t k = 0; k < 5; ++k) {
-    for (const float lane : lanes[k]) {
-      moments_[k] += static_cast<double>(lane);
-    }
+  std::int32_t both = 0;
+  for (std::size_t c = 1; c + 1 < side; ++c) {
+    both += (here[c + 1] - here[c - 1]) * (above[c] - below[c]);
   }
+  moments_[0] += sum;
+  moments_[1] += square;
+  moments_[2] += along_x;
+  moments_[3] += along_y;
+  moments_[4] += 0.25 * both;
 }
 
 void Matcher::end_curvature() {

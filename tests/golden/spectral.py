@@ -153,7 +153,19 @@ def rotations(f, g, share, fit):
             yield x * np.pi / count, (n / 2) ** (-(y - n * (row >= n / 2)) / n), q[i]
 
 
-def match(f, g, share=.5, low_pass=.25, fit=centre_of_mass):
+def coefficients(f, m, g, w, least):
+    """The correlation coefficient of what both have observed at every cyclic shift (Padfield 2012), 0 where that is
+    less than `least` of the smaller mask."""
+    spectrum = np.fft.fft2
+    sums = lambda u, v: np.fft.ifft2(spectrum(u) * np.conj(spectrum(v))).real
+    n, f1, g1 = np.maximum(sums(m, w), 1e-9), sums(f * m, w), sums(m, g * w)
+    variance = (sums(f * f * m, w) - f1 ** 2 / n) * (sums(m, g * g * w) - g1 ** 2 / n)
+    covariance = sums(f * m, g * w) - f1 * g1 / n
+    known = (n >= least * min(m.sum(), w.sum()) - .5) & (variance > 1e-9)
+    return np.where(known, covariance / np.sqrt(np.where(known, variance, 1)), 0)
+
+
+def match(f, g, share=.5, low_pass=.25, fit=centre_of_mass, seen=None):
     n = len(f['a'])
     frequency = np.fft.fftfreq(n)
     low = np.exp(-.5 * (frequency[:, None] ** 2 + frequency[None, :] ** 2) / low_pass ** 2)
@@ -169,6 +181,9 @@ def match(f, g, share=.5, low_pass=.25, fit=centre_of_mass):
             spectrum = np.fft.fft2(turned)
             white = spectrum / (np.abs(spectrum) + g['floor'])
             surface = np.fft.ifft2(f['white'] * np.conj(white) * low).real * n * n / low.sum()
+            if seen:
+                mask = bilinear(np.pad(seen[1] * 1., 1), c * x + s * y + centre + 1, -s * x + c * y + centre + 1, 'constant')
+                surface = coefficients(f['a'], seen[0] * 1., turned, (mask >= .5) * 1., .3)
             top = np.unravel_index(np.argmax(surface), surface.shape)
             ty, tx = [(v + n / 2) % n - n / 2 for v in fit(surface, *top)]
             result.append((tx, ty, (beta + np.pi) % (2 * np.pi) - np.pi, surface[top], strength, scale))
@@ -220,5 +235,10 @@ def run(mode='rings', high_pass='radius', **options):
 hypotheses('kHypotheses', run())
 hypotheses('kLinearPolar', run('linear_polar', 'none', fit=lambda q, *at: centre_of_mass(q, *at, radius=2)))
 hypotheses('kLogPolar', run('log_polar', 'radius', fit=gaussian))
+y, x = np.mgrid[0:48, 0:48] - 23.5
+seen = np.hypot(x - 3, y + 2) < 19, np.hypot(x + 2.3, y - 1) < 20
+octets('kMaskA', np.packbits(seen[0].ravel(), bitorder='little'))
+octets('kMaskB', np.packbits(seen[1].ravel(), bitorder='little'))
+hypotheses('kMasked', run(seen=seen))
 hypotheses('kPaper', run('log_polar_scale', 'reddy', share=.9, low_pass=1e9))
 print('\n}  // namespace golden\n// clang-format on')
