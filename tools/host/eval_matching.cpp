@@ -65,7 +65,7 @@ class PairMatcher {
       worker.picture.resize(std::size_t{config.side} * config.side);
       worker.observed.resize(mask_bytes(config.side));
       worker.free.resize(mask_bytes(config.side));
-      worker.scratch.resize(DigestMaker::scratch_size(grid.side, config.side));
+      worker.scratch.resize(DigestMaker::scratch_size(grid.side, config.side, config.preprocessing));
     }
   }
 
@@ -112,7 +112,7 @@ class PairMatcher {
     digest.observed = span(worker.observed);
     digest.free = span(worker.free);
     digest.side = config.side;
-    require(make_digest(grid, span(worker.scratch), digest), "digest");
+    require(make_digest(grid, span(worker.scratch), digest, config.preprocessing), "digest");
     out.features = out.memory.carve([&](auto& arena) { return Features::carve(arena, config); });
     const Status status = worker.matcher.extract(digest.obstacles, out.features, digest.observed);
     if (status != Status::degenerate) {

@@ -106,7 +106,8 @@ ObservedArea observed_area(const LiveDrive& drive, const EvalSubmap& submap, con
       continue;
     }
     const auto column = static_cast<double>(lattice.first_column) + static_cast<double>(cell % lattice.width) + 0.5;
-    const auto row = static_cast<double>(lattice.first_row) + static_cast<double>(cell / lattice.width) + 0.5;
+    const std::size_t row_above = cell / lattice.width;
+    const auto row = static_cast<double>(lattice.first_row) + static_cast<double>(row_above) + 0.5;
     const Pose2 at = compose(submap_T_truth, {column * lattice.cell_m, row * lattice.cell_m, 0.0});
     if (std::fabs(at.x) < half_m && std::fabs(at.y) < half_m) {
       area.bits[cell / 64] |= std::uint64_t{1} << (cell % 64);

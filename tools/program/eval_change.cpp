@@ -126,8 +126,8 @@ class ChangeEvaluation {
     host::SubmapOptions submap_options;
     submap_options.seed = seed;
     const std::vector<host::EvalSubmap> submaps = host::make_submaps(drives, submap_options, options_.common.threads);
-    const std::vector<host::EvalPair> pairs = host::sample_pairs(
-        host::make_pairs(submaps, host::PairChoice::between_sessions), options_.common.pairs, seed);
+    const std::vector<host::EvalPair> pairs =
+        host::sample_pairs(host::make_pairs(submaps, host::PairChoice::between_sessions), options_.common.pairs, seed);
 
     Outcome outcome;
     host::MatchVariant screening;

@@ -115,7 +115,9 @@ MatcherConfig EvalCurve::matcher() const {
   }
   config.side = side();
   config.com_radius = static_cast<std::uint8_t>(com);
-  (void)preprocessing;
+  config.preprocessing = preprocessing == "none"   ? Preprocessing::none
+                         : preprocessing == "blur" ? Preprocessing::blur
+                                                   : Preprocessing::erosion;
   return config;
 }
 

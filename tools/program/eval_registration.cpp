@@ -203,7 +203,7 @@ class RegistrationEvaluation {
     if (!pipeline) {
       host::MatchVariant variant;
       variant.matcher = curve.matcher();
-      variant.verified = 2 * kMaxRotationPeaks;
+      variant.verified = kMaxMatchHypotheses;
       return host::match_pairs(set.submaps, pairs, variant, options_.common.threads);
     }
     Config config = desktop_profile();
