@@ -174,8 +174,8 @@ struct Pair {
 };
 
 /// All pairs that share at least 40 % (positive) or at most 10 % (negative) of what they have seen, best peak first.
-std::vector<Pair> match_all(const std::vector<Submap>& submaps, std::uint16_t side, bool positives_only) {
-  MatcherConfig config;
+std::vector<Pair> match_all(const std::vector<Submap>& submaps, std::uint16_t side, bool positives_only,
+                            MatcherConfig config = {}) {
   config.side = side;
   config.pixel_m = static_cast<float>(kGridSide * kCell / side);
   MeasureArena measure;
@@ -192,8 +192,8 @@ std::vector<Pair> match_all(const std::vector<Submap>& submaps, std::uint16_t si
   for (const Submap& submap : submaps) {
     pictures.push_back(digest_of(submap, side));
     features.push_back(Features::carve(arena, config));
-    REQUIRE(matcher.extract({pictures.back().obstacles.data(), pictures.back().obstacles.size()}, features.back()) ==
-            Status::ok);
+    REQUIRE(matcher.extract({pictures.back().obstacles.data(), pictures.back().obstacles.size()}, features.back(),
+                            {pictures.back().observed.data(), pictures.back().observed.size()}) == Status::ok);
   }
   std::vector<Pair> pairs;
   for (std::size_t a = 0; a < submaps.size(); ++a) {
@@ -212,6 +212,15 @@ std::vector<Pair> match_all(const std::vector<Submap>& submaps, std::uint16_t si
   }
   std::sort(pairs.begin(), pairs.end(), [](const Pair& p, const Pair& q) { return p.peak > q.peak; });
   return pairs;
+}
+
+double share_right(const std::vector<Pair>& pairs) {
+  double right = 0, all = 0;
+  for (const Pair& pair : pairs) {
+    right += pair.metres < 0.8 && pair.radians < 10 * kPi / 180 ? 1 : 0;
+    all += 1;
+  }
+  return right / all;
 }
 
 }  // namespace
@@ -246,6 +255,13 @@ TEST_SUITE("matcher_data") {
     REQUIRE(positives > 30);
     CHECK(average_precision > 0.95);
     CHECK(right / positives > 0.85);
+
+    MatcherConfig without;
+    without.free_weight = 0.0F;
+    const double with_free = share_right(match_all(submaps, 96, true));
+    const double without_free = share_right(match_all(submaps, 96, true, without));
+    MESSAGE("right poses where observed free space counts " << with_free << ", where it does not " << without_free);
+    CHECK(with_free > without_free);
 
     std::vector<double> metres;
     double wrong = 0;

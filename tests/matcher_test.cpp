@@ -3,6 +3,7 @@
 #include <doctest.h>
 
 #include <cmath>
+#include <cstring>
 #include <initializer_list>
 #include <utility>
 #include <vector>
@@ -35,7 +36,7 @@ bool same_bits(const HypothesisList& a, const HypothesisList& b) {
 
 TEST_SUITE("matcher") {
   TEST_CASE("hypotheses equal those of a numpy implementation in double precision") {
-    const auto check = [](const char* name, const MatcherConfig& config, const auto& expected) {
+    const auto check = []([[maybe_unused]] const char* name, const MatcherConfig& config, const auto& expected) {
       CAPTURE(name);
       Bench bench(config);
       const Picture picture_a = golden_picture(golden::kPictureA);
@@ -230,6 +231,42 @@ TEST_SUITE("matcher") {
     options.min_rotation_peak = 0.9F;
     REQUIRE(bench.matcher.match(a, b, options) == Status::ok);
     CHECK(bench.matcher.hypotheses().empty());
+  }
+
+  TEST_CASE("observed free space counts against obstacles, the unobserved not at all") {
+    MatcherConfig config = config_of(48);
+    config.free_weight = 0.5F;
+    Bench bench(config);
+    Picture picture = golden_picture(golden::kPictureA);
+    picture[20 * 48 + 20] = 255;
+    picture[20 * 48 + 21] = 51;
+    picture[20 * 48 + 22] = 0;
+    std::vector<std::uint8_t> observed(mask_bytes(48), 0xFF);
+    observed[(30 * 48 + 16) / 8] = 0;
+    picture[30 * 48 + 16] = 51;
+    Features features = bench.carve();
+    REQUIRE(bench.matcher.extract({picture.data(), picture.size()}, features, {observed.data(), observed.size()}) ==
+            Status::ok);
+    CHECK(features.image[20 * 48 + 20] == doctest::Approx(1.0));
+    CHECK(features.image[20 * 48 + 21] == doctest::Approx(0.2 - 0.5 * 0.8));
+    CHECK(features.image[20 * 48 + 22] == doctest::Approx(-0.5));
+    CHECK(features.image[30 * 48 + 16] == doctest::Approx(0.2));
+
+    // Without a mask, or with no weight, it is the paper's picture: free and unobserved are the same.
+    const Features paper = bench.extract(picture);
+    CHECK(paper.image[20 * 48 + 22] == 0.0F);
+    config.free_weight = 0.0F;
+    Bench weightless(config);
+    Features same = weightless.carve();
+    REQUIRE(weightless.matcher.extract({picture.data(), picture.size()}, same, {observed.data(), observed.size()}) ==
+            Status::ok);
+    CHECK(std::equal(same.image.begin(), same.image.end(), paper.image.begin()));
+    CHECK(std::memcmp(same.filter.data(), paper.filter.data(), same.filter.size() * sizeof(Complex)) == 0);
+
+    // Free space without an obstacle is no structure, whatever its outline.
+    const Picture flat(48 * 48, 0);
+    CHECK(bench.matcher.extract({flat.data(), flat.size()}, features, {observed.data(), observed.size()}) ==
+          Status::degenerate);
   }
 
   TEST_CASE("pictures without structure are degenerate and match nothing") {

@@ -16,37 +16,19 @@
 #include "host/simulator.hpp"
 #include "host/tum.hpp"
 #include "tests/host_support.hpp"
+#include "tests/support/mellin_program.hpp"
 #include "tests/support/simulated_log.hpp"
 
 using namespace mellin;
 using mellin::test::kSanitized;
+using mellin::test::lines_of;
+using mellin::test::mellin_program;
+using mellin::test::Outcome;
 using mellin::test::read_bytes;
 using mellin::test::TemporaryFolder;
 namespace fs = std::filesystem;
 
 namespace {
-
-struct Outcome {
-  int status = -1;
-  std::string out;
-  std::string err;
-};
-
-Outcome mellin_program(const TemporaryFolder& folder, const std::string& arguments) {
-  const std::string program = (fs::read_symlink("/proc/self/exe").parent_path() / "mellin").string();
-  const std::string out = folder.path() + "/stdout", err = folder.path() + "/stderr";
-  const int status = std::system((program + " " + arguments + " >" + out + " 2>" + err).c_str());
-  return {WEXITSTATUS(status), read_bytes(out), read_bytes(err)};
-}
-
-std::vector<std::string> lines_of(const std::string& text) {
-  std::vector<std::string> lines;
-  std::istringstream in(text);
-  for (std::string line; std::getline(in, line);) {
-    lines.push_back(line);
-  }
-  return lines;
-}
 
 std::size_t columns(const std::string& line) {
   return static_cast<std::size_t>(std::count(line.begin(), line.end(), ',')) + 1;

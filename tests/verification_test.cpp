@@ -2,6 +2,7 @@
 
 #include <doctest.h>
 
+#include <initializer_list>
 #include <limits>
 #include <vector>
 
@@ -123,6 +124,40 @@ TEST_CASE("poses turn about the grid's centre") {
   CHECK(right.hits_a_on_b == 10);
   const Agreement wrong = agreement(Classes(wall(12).view()), Classes(turned.view()), {0.0, 0.0, -kHalfPi});
   CHECK(wrong.hits_b_on_a == 0);
+}
+
+TEST_CASE("obstacles alone give the hits, conflicts and score of all cells, also across the border") {
+  TestGrid grid_a = wall(8);
+  TestGrid grid_b = wall(20);
+  for (int i = 0; i < kSide; ++i) {
+    grid_a.set(i, (5 * i + i * i / 3) % kSide, kWall);
+    grid_b.set((7 * i + 3) % kSide, i, kWall);
+  }
+  for (const std::uint8_t reach : std::initializer_list<std::uint8_t>{0, 1}) {
+    const VerificationConfig config = {127, reach, reach, 2.0F};
+    const Classes a(grid_a.view(), kSide, config);
+    const Classes b(grid_b.view(), kSide / 2, config);
+    std::vector<ClassCell> memory_a(a.memory.size());
+    std::vector<ClassCell> memory_b(b.memory.size());
+    const auto cells_a = obstacles(a.view, {memory_a.data(), memory_a.size()});
+    const auto cells_b = obstacles(b.view, {memory_b.data(), memory_b.size()});
+    REQUIRE(cells_a.ok());
+    REQUIRE(cells_b.ok());
+    CHECK(cells_a.value().size() == a.count(kClassOccupied));
+    for (int i = 0; i < 40; ++i) {
+      const Pose2 a_T_b{0.21 * i - 4.0, 3.0 - 0.17 * i, 0.37 * i};
+      const Agreement all = verify(a.view, b.view, a_T_b, config).value();
+      const Agreement quick =
+          verify_obstacles({a.view, cells_a.value()}, {b.view, cells_b.value()}, a_T_b, config).value();
+      CHECK(quick.score == all.score);
+      CHECK(quick.hits_b_on_a == all.hits_b_on_a);
+      CHECK(quick.conflicts_b_on_a == all.conflicts_b_on_a);
+      CHECK(quick.hits_a_on_b == all.hits_a_on_b);
+      CHECK(quick.conflicts_a_on_b == all.conflicts_a_on_b);
+      CHECK((i != 10 || all.hits_b_on_a + all.hits_a_on_b > 0));
+    }
+    CHECK(obstacles(a.view, {memory_a.data(), 5}).status() == Status::invalid_argument);
+  }
 }
 
 TEST_CASE("what was not observed says nothing") {

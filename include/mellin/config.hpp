@@ -57,6 +57,10 @@ constexpr Config resolved(const Config& given) {
   c.screening.grid_side = c.side;
   c.screening.max_submaps = c.max_submaps;
   c.screening.matcher.side = c.screening_side;
+  const std::uint32_t most_turns = std::uint32_t{c.screening_side} * c.screening.matcher.turns_per_bin;
+  if (c.screening.matcher.kept_turns > most_turns) {
+    c.screening.matcher.kept_turns = static_cast<std::uint16_t>(most_turns);
+  }
   c.screening.matcher.pixel_m = c.cell_m * static_cast<float>(c.side) / static_cast<float>(c.screening_side);
   c.registration.grid_side = c.side;
   c.registration.class_side = c.class_side;
@@ -99,6 +103,10 @@ constexpr Config desktop_profile() {
   Config c;
   c.max_submaps = 1024;
   c.grid_slots = 16;
+  // A new submap meets all others: what turning it takes is done once an angle. A quarter of an angular bin is finer
+  // than the angles are known, and loses no edge on the real logs.
+  c.screening.matcher.turns_per_bin = 4;
+  c.screening.matcher.kept_turns = 384;
   c.collection.graph.max_edges = 8192;
   c.collection.graph.max_fill = 32768;
   return c;

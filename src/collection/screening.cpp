@@ -78,9 +78,8 @@ Features SpectralScreening::cached_features(std::uint32_t index) const {
 }
 
 void SpectralScreening::begin_features(std::uint32_t index, Features& out, Stage stage) {
-  stage_ = matcher_.begin_extract(digest_out(index).obstacles, out, digest_out(index).observed) == Status::ok
-               ? stage
-               : Stage::idle;
+  const DigestOut digest = digest_out(index);
+  stage_ = matcher_.begin_extract(digest.obstacles, out, digest.observed) == Status::ok ? stage : Stage::idle;
 }
 
 void SpectralScreening::begin_caching(std::uint32_t index) {
@@ -185,9 +184,9 @@ bool SpectralScreening::step() {
       break;
     case Stage::match:
       if (matcher_.step()) {
-        class_a_ = classes(a_, memory_.classes_a);
+        class_a_ = classes(a_, memory_.classes_a, memory_.obstacles_a);
         if (classified_b_ != b_) {
-          class_b_ = classes(b_, memory_.classes_b);
+          class_b_ = classes(b_, memory_.classes_b, memory_.obstacles_b);
           classified_b_ = b_;
         }
         verify_next_ = 0;
@@ -201,21 +200,24 @@ bool SpectralScreening::step() {
   return stage_ == Stage::idle;
 }
 
-ClassView SpectralScreening::classes(std::uint32_t index, Span<std::uint8_t> out) {
+ClassObstacles SpectralScreening::classes(std::uint32_t index, Span<std::uint8_t> out, Span<ClassCell> cells) {
   const Result<ClassView> view = classify(digest_out(index).view(config_.matcher.pixel_m), config_.verification, out);
-  return view.ok() ? view.value() : ClassView{};
+  if (!view.ok()) {
+    return {};
+  }
+  const Result<Span<const ClassCell>> found = obstacles(view.value(), cells);
+  return {view.value(), found.ok() ? found.value() : Span<const ClassCell>()};
 }
 
 void SpectralScreening::verify_one() {
   const HypothesisList& found = matcher_.hypotheses();
   const Hypothesis& h = found[verify_next_];
-  const Result<Agreement> agreement = verify(class_a_, class_b_, h.a_T_b, config_.verification);
+  const Result<Agreement> agreement = verify_obstacles(class_a_, class_b_, h.a_T_b, config_.verification);
   PlaceHypothesis out;
   out.a_T_b = h.a_T_b;
   out.peak = h.peak;
   if (agreement.ok()) {
     out.agreement = agreement.value().score;
-    out.overlap = agreement.value().overlap;
   }
   insert_by_agreement(hypotheses_, out);
   ++verify_next_;

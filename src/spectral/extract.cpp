@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mellin/grid/digest.hpp"
 #include "mellin/spectral/matcher.hpp"
 
 namespace mellin {
@@ -19,6 +20,7 @@ ImageView Matcher::picture_image() const {
   return {memory.first(pixels), config_.side};
 }
 
+/// Obstacles count 1, observed free space -free_weight, what lies between in between, the unobserved 0.
 void Matcher::load_rows(std::size_t first, std::size_t count) {
   const ImageView image = picture_image();
   const std::size_t end = (first + count) * image.side;
@@ -30,6 +32,14 @@ void Matcher::load_rows(std::size_t first, std::size_t count) {
   }
   for (std::size_t r = first; r < first + count; ++r) {
     add_curvature(r);
+  }
+  if (observed_.empty() || config_.masked || !(config_.free_weight > 0.0F)) {
+    return;
+  }
+  for (std::size_t i = first * image.side; i < end; ++i) {
+    if (mask_bit(observed_, i)) {
+      image.pixels[i] -= config_.free_weight * (1.0F - image.pixels[i]);
+    }
   }
 }
 

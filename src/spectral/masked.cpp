@@ -183,10 +183,7 @@ void Matcher::search_masked_rows(std::size_t first, std::size_t count) {
     const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
     const float* row = masked_surface_rows(r, rows);
     for (std::size_t i = r; i < r + rows; ++i, row += side) {
-      const float top = highest(row, side);
-      if (top > peak_.value) {
-        peak_ = {top, i, static_cast<std::size_t>(std::find(row, row + side, top) - row)};
-      }
+      peaks_.add_row(i, {row, side});
     }
   }
 }

@@ -134,45 +134,67 @@ void Matcher::filter_turned_columns(std::size_t first, std::size_t count) {
   }
 }
 
+void Matcher::begin_surface() {
+  peak_ = {};
+  peaks_.begin(config_.side, config_.translation_peaks);
+}
+
 /// The correlation surface is looked at as it comes, a block of rows at a time, and never stored.
 void Matcher::search_surface_rows(std::size_t first, std::size_t count) {
   for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
-    fft_.inverse_rows_search(surface(), r, std::min(Fft2::kBlock, first + count - r), peak_);
+    const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
+    if (config_.translation_peaks == 1) {
+      fft_.inverse_rows_search(surface(), r, rows, peak_);
+      continue;
+    }
+    fft_.inverse_rows(surface(), r, rows, memory_.rows.data());
+    for (std::size_t i = 0; i < rows; ++i) {
+      peaks_.add_row(r + i, memory_.rows.subspan(i * config_.side, config_.side));
+    }
+  }
+  if (config_.translation_peaks == 1 && first + count == config_.side && peak_.value > 0.0F) {
+    peaks_.add(peak_);
   }
 }
 
-/// Row `row` of the surface under way; valid until the next one.
-const float* Matcher::surface_row(std::size_t row) {
+/// Row `row` of the surface under way. Rows are asked for in ascending order, cyclically; `begins` says which is the
+/// first. Where there are lanes a block of rows takes no longer than one.
+const float* Matcher::surface_row(std::size_t row, bool begins) {
   if (config_.masked) {
     return masked_surface_rows(row, 1);
   }
-  fft_.inverse_rows(surface(), row, 1, memory_.rows.data());
-  return memory_.rows.data();
+  constexpr std::size_t kRows = kFftLanes > 1 ? Fft2::kBlock : 1;
+  const std::size_t side = config_.side;
+  if (begins || row < block_row_ || row >= block_row_ + kRows) {
+    block_row_ = std::min(row, side - kRows);
+    fft_.inverse_rows(surface(), block_row_, kRows, memory_.rows.data());
+  }
+  return memory_.rows.data() + (row - block_row_) * side;
 }
 
-/// The highest value's place, refined, and the pose that it means.
-void Matcher::locate_peak() {
-  if (!(peak_.value > 0.0F) || peak_.value < config_.min_peak) {
+/// A peak's place, refined, and the pose that it means.
+void Matcher::locate_peak(const Fft2::Peak& peak) {
+  if (peak.value < config_.min_peak) {
     return;
   }
   const std::size_t side = config_.side;
   const int radius = PeakWindow::radius_for(config_);
   PeakWindow window;
   for (int dy = -radius; dy <= radius; ++dy) {
-    window.set_row(dy, {surface_row(cyclic(peak_.row, dy, side)), side}, peak_.column, radius);
+    window.set_row(dy, {surface_row(cyclic(peak.row, dy, side), dy == -radius), side}, peak.column, radius);
   }
   const PeakOffset offset = peak_offset(window, radius, config_);
   // Turning pixel centres 0 … side - 1 by 180 degrees about their middle maps i to side - 1 - i, whereas the conjugate
   // spectrum stands for -i: a shift of side - 1 is to be taken off.
   const double mirrored = half_turn_ ? static_cast<double>(side - 1) : 0.0;
-  const double x = static_cast<double>(peak_.column) + offset.x - mirrored;
-  const double y = static_cast<double>(peak_.row) + offset.y - mirrored;
+  const double x = static_cast<double>(peak.column) + offset.x - mirrored;
+  const double y = static_cast<double>(peak.row) + offset.y - mirrored;
   const auto pixel_m = static_cast<double>(config_.pixel_m);
   const RotationPeak& rotation = rotation_.peaks()[rotation_index_];
   Hypothesis hypothesis;
   hypothesis.a_T_b = {nearest_shift(x, side) * pixel_m, nearest_shift(y, side) * pixel_m,
                       wrap_angle(turned_angle() + (half_turn_ ? kPi : 0.0))};
-  hypothesis.peak = peak_.value;
+  hypothesis.peak = peak.value;
   hypothesis.rotation_peak = rotation.strength;
   hypothesis.scale = rotation.scale;
   const PeakSpread spread = translation_spread(window, radius);
@@ -211,13 +233,7 @@ void Matcher::add_hypothesis(const Hypothesis& hypothesis) {
       if (hypotheses_[i].peak >= hypothesis.peak) {
         return;
       }
-      HypothesisList others;
-      for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
-        if (k != i) {
-          others.insert(others.size(), hypotheses_[k]);
-        }
-      }
-      hypotheses_ = others;
+      hypotheses_.erase(i);
       break;
     }
   }

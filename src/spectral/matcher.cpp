@@ -5,6 +5,8 @@
 #include <cassert>
 #include <iterator>
 
+#include "mellin/grid/digest.hpp"
+
 namespace mellin {
 
 namespace {
@@ -65,8 +67,8 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUn
   return Status::ok;
 }
 
-Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out, Span<const std::uint8_t> observed) {
-  const bool valid = fft_.side() > 0 && picture.size() == std::size_t{config_.side} * config_.side &&
+Status Matcher::begin_extract(Span<const std::uint8_t> obstacles, Features& out, Span<const std::uint8_t> observed) {
+  const bool valid = fft_.side() > 0 && obstacles.size() == std::size_t{config_.side} * config_.side &&
                      fits(out, config_) && (observed.empty() || observed.size() == mask_bytes(config_.side));
   assert(valid);
   stage_ = Stage::idle;
@@ -77,7 +79,7 @@ Status Matcher::begin_extract(Span<const std::uint8_t> picture, Features& out, S
   if (!valid) {
     return status_ = Status::invalid_argument;
   }
-  picture_ = picture;
+  picture_ = obstacles;
   observed_ = observed;
   out_ = &out;
   lowest_ = 255;
@@ -162,9 +164,10 @@ std::size_t Matcher::lines_of(Stage stage) const {
       return side / 2 + 1;
     case Stage::filter_columns:
       return side / 2;
+    case Stage::locate_peak:
+      return peaks_.size();
     case Stage::describe_rotation:
     case Stage::estimate_rotation:
-    case Stage::locate_peak:
     case Stage::idle:
       break;
   }
@@ -204,7 +207,10 @@ void Matcher::run(Stage stage, std::size_t first, std::size_t count) {
     case Stage::surface_rows:
       return search_surface_rows(first, count);
     case Stage::locate_peak:
-      return locate_peak();
+      for (std::size_t i = first; i < first + count; ++i) {
+        locate_peak(peaks_[i]);
+      }
+      return;
     case Stage::describe_rotation:
     case Stage::estimate_rotation:
     case Stage::idle:
@@ -253,7 +259,7 @@ Matcher::Stage Matcher::after(Stage stage) {
     case Stage::filter_columns:
     case Stage::masked_turned_columns:
       half_turn_ = false;
-      peak_ = {};
+      begin_surface();
       return config_.masked ? Stage::masked_correlation : Stage::surface_rows;
     case Stage::masked_correlation:
       return Stage::masked_search;
@@ -263,7 +269,7 @@ Matcher::Stage Matcher::after(Stage stage) {
     case Stage::locate_peak:
       if (!half_turn_) {
         half_turn_ = true;
-        peak_ = {};
+        begin_surface();
         return config_.masked ? Stage::masked_correlation : Stage::surface_rows;
       }
       return ++rotation_index_ == rotation_count() ? Stage::idle : begin_rotation();
@@ -273,8 +279,8 @@ Matcher::Stage Matcher::after(Stage stage) {
   return Stage::idle;
 }
 
-Status Matcher::extract(Span<const std::uint8_t> picture, Features& out, Span<const std::uint8_t> observed) {
-  const Status begun = begin_extract(picture, out, observed);
+Status Matcher::extract(Span<const std::uint8_t> obstacles, Features& out, Span<const std::uint8_t> observed) {
+  const Status begun = begin_extract(obstacles, out, observed);
   while (!step()) {
   }
   return begun == Status::ok ? status_ : begun;

@@ -106,7 +106,8 @@ ObservedArea observed_area(const LiveDrive& drive, const EvalSubmap& submap, con
       continue;
     }
     const auto column = static_cast<double>(lattice.first_column) + static_cast<double>(cell % lattice.width) + 0.5;
-    const auto row = static_cast<double>(lattice.first_row) + static_cast<double>(cell / lattice.width) + 0.5;
+    const std::size_t row_above = cell / lattice.width;
+    const auto row = static_cast<double>(lattice.first_row) + static_cast<double>(row_above) + 0.5;
     const Pose2 at = compose(submap_T_truth, {column * lattice.cell_m, row * lattice.cell_m, 0.0});
     if (std::fabs(at.x) < half_m && std::fabs(at.y) < half_m) {
       area.bits[cell / 64] |= std::uint64_t{1} << (cell % 64);
@@ -264,7 +265,7 @@ std::vector<EvalPair> make_pairs(const std::vector<EvalSubmap>& submaps, PairCho
       const std::size_t shared = shared_cells(submaps[a].area, submaps[b].area);
       const std::size_t smaller = std::min(submaps[a].area.cells, submaps[b].area.cells);
       const std::size_t either = submaps[a].area.cells + submaps[b].area.cells - shared;
-      EvalPair pair{a, b, 0.0, 0.0, between(submaps[a].truth_T_submap, submaps[b].truth_T_submap)};
+      EvalPair pair{a, b, 0.0, 0.0, between(submaps[a].truth_T_submap, submaps[b].truth_T_submap), 1.0};
       if (smaller > 0) {
         pair.overlap = static_cast<double>(shared) / static_cast<double>(smaller);
         pair.union_overlap = static_cast<double>(shared) / static_cast<double>(either);

@@ -95,7 +95,7 @@ struct SubmapOptions {
   float cell_m = 0.05F;
   SubmapFrames frames = SubmapFrames::random;
   std::uint64_t seed = 1;     ///< of the orientations
-  double area_cell_m = 0.20;  ///< of the lattice that overlap is counted on
+  double area_cell_m = 0.05;  ///< of the lattice that overlap is counted on: the cells of the submaps
 };
 
 /// The submaps of all drives, whose truths are in one frame, in order. Centred where their scans were taken. The
@@ -110,6 +110,7 @@ struct EvalPair {
   double overlap = 0.0;        ///< shared observed area over the smaller one, at the true poses
   double union_overlap = 0.0;  ///< … over the area that either observed
   Pose2 a_T_b;                 ///< true
+  double weight = 1.0;         ///< how many pairs it stands for, where they were sampled
 };
 
 enum class PairChoice {

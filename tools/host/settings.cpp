@@ -23,6 +23,10 @@ void visit_matcher(const std::string& prefix, C& c, Visit& visit) {
   visit((prefix + "max_peaks").c_str(), c.max_peaks);
   visit((prefix + "min_peak").c_str(), c.min_peak);
   visit((prefix + "lowpass_sigma").c_str(), c.lowpass_sigma);
+  visit((prefix + "translation_peaks").c_str(), c.translation_peaks);
+  visit((prefix + "free_weight").c_str(), c.free_weight);
+  visit((prefix + "turns_per_bin").c_str(), c.turns_per_bin);
+  visit((prefix + "kept_turns").c_str(), c.kept_turns);
   visit((prefix + "masked").c_str(), c.masked);
   visit((prefix + "min_overlap").c_str(), c.min_overlap);
 }
@@ -98,8 +102,6 @@ void visit_settings(C& c, Visit&& visit) {
   visit("submaps.min_scans", c.submaps.min_scans);
   visit("submaps.band_rows", c.submaps.band_rows);
   visit_matcher("screening.", c.screening.matcher, visit);
-  visit("screening.turns_per_bin", c.screening.matcher.turns_per_bin);
-  visit("screening.kept_turns", c.screening.matcher.kept_turns);
   visit("screening.verified", c.screening.verified);
   visit("screening.cache_features", c.screening.cache_features);
   visit("screening.hold_digests", c.screening.hold_digests);

@@ -41,6 +41,8 @@ class SpectralScreening final : public DigestMatcher {
     Matcher::Memory matcher;
     Span<std::uint8_t> classes_a;
     Span<std::uint8_t> classes_b;
+    Span<ClassCell> obstacles_a;
+    Span<ClassCell> obstacles_b;
     Span<float> scratch;  ///< for making digests
   };
 
@@ -78,6 +80,8 @@ class SpectralScreening final : public DigestMatcher {
     m.matcher = Matcher::carve(kept, work, config.matcher);
     m.classes_a = work.template take<std::uint8_t>(pixels, Part::spectral);
     m.classes_b = work.template take<std::uint8_t>(pixels, Part::spectral);
+    m.obstacles_a = work.template take<ClassCell>(pixels, Part::spectral);
+    m.obstacles_b = work.template take<ClassCell>(pixels, Part::spectral);
     m.scratch = work.template take<float>(scratch_size(config), Part::spectral);
     return m;
   }
@@ -108,7 +112,7 @@ class SpectralScreening final : public DigestMatcher {
   void begin_caching(std::uint32_t index);
   void begin_features(std::uint32_t index, Features& out, Stage stage);
   void begin_match();
-  ClassView classes(std::uint32_t index, Span<std::uint8_t> out);
+  ClassObstacles classes(std::uint32_t index, Span<std::uint8_t> out, Span<ClassCell> cells);
   void verify_one();
 
   ScreeningConfig config_;
@@ -126,8 +130,8 @@ class SpectralScreening final : public DigestMatcher {
   Features features_a_;                 ///< while they are cached, those under way
   Features features_b_;
   std::size_t verify_next_ = 0;
-  ClassView class_a_;
-  ClassView class_b_;
+  ClassObstacles class_a_;
+  ClassObstacles class_b_;
   PlaceHypotheses hypotheses_;
 };
 

@@ -154,6 +154,14 @@ class FixedList {
     }
     items_[i] = value;
   }
+  /// Removes element i; those behind move up.
+  void erase(std::size_t i) {
+    assert(i < size_);
+    for (std::size_t k = i + 1; k < size_; ++k) {
+      items_[k - 1] = items_[k];
+    }
+    --size_;
+  }
   void clear() { size_ = 0; }
 
  private:

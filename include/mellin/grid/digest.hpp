@@ -93,7 +93,8 @@ class DigestMaker {
   template <class Read>
   void preprocess_and_halve(const Read& read, std::size_t side, std::size_t row);
   const float* blurred_full_row(std::size_t row);
-  float thickened(std::size_t column, std::size_t row) const;
+  void thicken_and_halve_cells(std::size_t row);
+  void full_strip(std::size_t row, std::size_t first, std::size_t count, const float* blurred, float* out) const;
 
   GridView grid_;
   DigestOut out_;

@@ -24,6 +24,7 @@
 #include "mellin/spectral/fft2.hpp"
 #include "mellin/spectral/matcher_config.hpp"
 #include "mellin/spectral/rotation.hpp"
+#include "mellin/spectral/surface_peaks.hpp"
 
 namespace mellin {
 
@@ -50,8 +51,10 @@ struct Hypothesis {
   PeakCovariance covariance;   ///< of a_T_b, from noise only: a wrong hypothesis may have a small one
 };
 
+/// Of one match; the lowest peaks drop out.
+inline constexpr std::size_t kMaxMatchHypotheses = 32;
 /// Best first.
-using HypothesisList = FixedList<Hypothesis, 2 * kMaxRotationPeaks>;
+using HypothesisList = FixedList<Hypothesis, kMaxMatchHypotheses>;
 
 /// What may differ from match to match.
 struct MatchOptions {
@@ -106,10 +109,11 @@ class Matcher {
   Status init(const MatcherConfig& config, const Memory& memory, VectorUnit unit = best_vector_unit());
   const MatcherConfig& config() const { return config_; }
 
-  /// Starts making the features of `picture` (side * side bytes) in `out`; both must live until the job is done. An
-  /// unfinished earlier job is given up. `observed`: a mask of bits as a digest has it, for MatcherConfig::masked, must
-  /// live, too; empty: all of it. invalid_argument: sizes do not hold.
-  Status begin_extract(Span<const std::uint8_t> picture, Features& out, Span<const std::uint8_t> observed = {});
+  /// Starts making the features of a picture in `out`: its obstacles (side * side bytes) and the mask of what was
+  /// observed (mask_bytes(side), see digest.hpp; empty: nothing is known to be free, all counts as observed where
+  /// MatcherConfig::masked asks). All must live until
+  /// the job is done. An unfinished earlier job is given up. invalid_argument: sizes do not hold.
+  Status begin_extract(Span<const std::uint8_t> obstacles, Features& out, Span<const std::uint8_t> observed = {});
   /// Starts matching; the memory of both must live and stay until the job is done, and they may be the same. An
   /// unfinished earlier job is given up. invalid_argument: sizes do not hold, or a has no filter, or b no image.
   /// degenerate: one of them is not ready; there are no hypotheses then.
@@ -129,7 +133,7 @@ class Matcher {
   const HypothesisList& hypotheses() const { return hypotheses_; }
 
   /// begin_extract() and all its steps. Status of both.
-  Status extract(Span<const std::uint8_t> picture, Features& out, Span<const std::uint8_t> observed = {});
+  Status extract(Span<const std::uint8_t> obstacles, Features& out, Span<const std::uint8_t> observed = {});
   /// begin_match() and all its steps. Status of both; see hypotheses().
   Status match(const Features& a, const Features& b, const MatchOptions& options = {});
 
@@ -193,10 +197,11 @@ class Matcher {
   void search_masked_rows(std::size_t first, std::size_t count);
   Span<Complex> masked_spectrum_of_b(std::size_t i) const;
   Span<Complex> masked_sum(std::size_t i) const;
+  void begin_surface();
   void search_surface_rows(std::size_t first, std::size_t count);
-  const float* surface_row(std::size_t row);
+  const float* surface_row(std::size_t row, bool begins);
   PeakSpread translation_spread(const PeakWindow& window, int radius) const;
-  void locate_peak();
+  void locate_peak(const Fft2::Peak& peak);
   /// Rotation peaks that are tried.
   std::size_t rotation_count() const;
   void add_hypothesis(const Hypothesis& hypothesis);
@@ -214,7 +219,7 @@ class Matcher {
   std::size_t line_ = 0;  // next line of the stage
   Status status_ = Status::ok;
 
-  Span<const std::uint8_t> picture_;
+  Span<const std::uint8_t> picture_;  // obstacles …
   Span<const std::uint8_t> observed_;
   Features* out_ = nullptr;
   std::uint8_t lowest_ = 0;  // of the picture's bytes
@@ -230,8 +235,10 @@ class Matcher {
   bool half_turn_ = false;          // looking at beta + 180 degrees
   const float* query_ = nullptr;    // image of the picture whose turned spectra are kept
   std::size_t turns_ = 0;           // that are kept so far
+  std::size_t block_row_ = 0;       // first of the surface's rows that are at hand
   Span<Complex> turned_;            // b under way: turned, in the end whitened too
-  Fft2::Peak peak_;                 // of the correlation surface so far
+  SurfacePeaks peaks_;              // of the correlation surface so far
+  Fft2::Peak peak_;                 // the highest, where only that is asked for
   HypothesisList hypotheses_;
 };
 

@@ -11,6 +11,7 @@
 namespace mellin {
 
 inline constexpr std::size_t kMaxRotationPeaks = 6;
+inline constexpr std::size_t kMaxTranslationPeaks = 8;
 
 /// How the rotation is found from the magnitudes of the pictures' spectra (paper, Section IV-A step 2).
 enum class RotationMode : std::uint8_t {
@@ -48,6 +49,9 @@ struct MatcherConfig {
   /// At most so many rotation peaks are tried, strongest first (IV-B3): 1 … 6. Time is in proportion; each gives two
   /// hypotheses.
   std::uint8_t max_peaks = 6;
+  /// At most so many translation peaks of each turned picture become hypotheses, highest first: 1 … 8. The paper takes
+  /// one; more are worth it where what was observed is then asked which is right.
+  std::uint8_t translation_peaks = 1;
   /// Radius of the neighbourhood whose centre of mass is the peak's position (Eq. 3, CoM_r): 0 … 3 pixels. For
   /// PeakFit::centre_of_mass.
   std::uint8_t com_radius = 1;
@@ -77,6 +81,11 @@ struct MatcherConfig {
   PeakFit peak_fit = PeakFit::gaussian;
   /// Hypotheses with a lower peak are dropped (IV-B3), 0 … 1.
   float min_peak = 0.0F;
+  /// What observed free space counts in the picture that is matched, where an obstacle counts 1 and what was not
+  /// observed 0: an obstacle on the other's free space then speaks against a shift as one on an obstacle speaks for it,
+  /// and the unknown says nothing. 0 is the paper's way, which takes unobserved space for free (IV-B1). Without an
+  /// observed mask, or where `masked`, it has no effect. 0 … 4.
+  float free_weight = 1.0F;
   /// b is turned by multiples of an angular bin (180 degrees / side) over this, which is the angle that a hypothesis
   /// says then: 1 … 8; 0: by the very angle of the peak.
   std::uint8_t turns_per_bin = 0;
@@ -99,12 +108,13 @@ struct MatcherConfig {
 constexpr bool is_valid(const MatcherConfig& config) {
   return is_fft_side(config.side) && config.pixel_m > 0.0F && config.pixel_m < 1e3F && config.peak_share >= 0.0F &&
          config.peak_share <= 1.0F && config.max_peaks >= 1 && config.max_peaks <= kMaxRotationPeaks &&
-         config.com_radius <= 3 && config.lowpass_sigma >= 0.0F && config.lowpass_sigma < 1e3F &&
-         config.whitening_floor > 0.0F && config.whitening_floor <= 1.0F && config.edge_margin > 0.0F &&
-         config.edge_margin <= 0.1F && config.preprocessing <= Preprocessing::blur &&
-         config.rotation <= RotationMode::log_polar_scale && config.high_pass <= HighPass::reddy &&
-         config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F && config.min_peak <= 1.0F &&
-         config.min_overlap > 0.0F && config.min_overlap <= 1.0F && config.turns_per_bin <= 8 &&
+         config.translation_peaks >= 1 && config.translation_peaks <= kMaxTranslationPeaks && config.com_radius <= 3 &&
+         config.lowpass_sigma >= 0.0F && config.lowpass_sigma < 1e3F && config.whitening_floor > 0.0F &&
+         config.whitening_floor <= 1.0F && config.edge_margin > 0.0F && config.edge_margin <= 0.1F &&
+         config.preprocessing <= Preprocessing::blur && config.rotation <= RotationMode::log_polar_scale &&
+         config.high_pass <= HighPass::reddy && config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F &&
+         config.min_peak <= 1.0F && config.min_overlap > 0.0F && config.min_overlap <= 1.0F &&
+         config.free_weight >= 0.0F && config.free_weight <= 4.0F && config.turns_per_bin <= 8 &&
          config.kept_turns <= config.side * config.turns_per_bin;
 }
 
@@ -115,6 +125,7 @@ constexpr MatcherConfig paper_matcher(std::uint16_t side) {
   config.side = side;
   config.peak_share = 0.9F;
   config.lowpass_sigma = 0.0F;
+  config.free_weight = 0.0F;
   config.rotation = RotationMode::log_polar_scale;
   config.peak_fit = PeakFit::centre_of_mass;
   config.high_pass = HighPass::reddy;

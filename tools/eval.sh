@@ -1,0 +1,26 @@
+#!/usr/bin/env bash
+# The paper's evaluation (Section V) on the real logs and on simulated buildings that change: tables, curves and pictures
+# under build/eval. Takes an hour on one core and is no part of the tests.
+# usage: tools/eval.sh [EVAL OPTION…]      e.g. tools/eval.sh --threads 2, or --full (all pairs at full resolution: a day)
+# Logs: $MELLIN_DATA, else ../shared/data: NAME.log.gz and NAME.tum. intel comes first: thresholds chosen on it are held
+# on the others.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+data=${MELLIN_DATA:-../shared/data}
+mellin=build/host/bin/mellin
+out=build/eval
+logs=()
+for name in intel fr079 aces; do
+  [ -e "$data/$name.log.gz" ] && logs+=("$data/$name.log.gz")
+done
+if [ ${#logs[@]} -eq 0 ]; then
+  echo "skipped: no data"
+else
+  # Figs. 3 to 5 in random orientation, the honest one; Fig. 5 with axes aligned as well.
+  "$mellin" eval screening "${logs[@]}" -o "$out/screening" "$@"
+  "$mellin" eval screening "${logs[@]}" -o "$out/screening-aligned" --frames aligned --figures 5 "$@"
+  # Figs. 6 and 7, and the library's whole registration.
+  "$mellin" eval registration "${logs[@]}" -o "$out/registration" "$@"
+  "$mellin" eval registration "${logs[@]}" -o "$out/registration-aligned" --frames aligned --figures pipeline "$@"
+fi
+"$mellin" eval change -o "$out/change"
