@@ -147,6 +147,8 @@ TEST_SUITE("host_eval_matching") {
     CHECK(named({1 - 3 * std::sqrt(0.75), 1 - 1.5, 0.2}) == Confusion::slid);
     CHECK(named({1 - 1.5, 1 + 3 * std::sqrt(0.75), 0.2}) == Confusion::shifted);
     CHECK(named({1, 1, 1.0}) == Confusion::other);
+    CHECK(named({1.5, 1.5, 0.3}) == Confusion::near);
+    CHECK(named({1.5, 1.5, 0.2 + 10.0 * kPi / 180.0}) != Confusion::near);
     CHECK(named({1, 1, 0.2 + kPi}, 0.05) == Confusion::elsewhere);
     CHECK(std::string(to_string(Confusion::half_turn)) == "turned by 180 degrees");
   }

@@ -266,6 +266,8 @@ std::vector<PoseDecision> pose_decisions(const std::vector<EvalPair>& pairs,
 
 const char* to_string(Confusion confusion) {
   switch (confusion) {
+    case Confusion::near:
+      return "near";
     case Confusion::elsewhere:
       return "elsewhere";
     case Confusion::half_turn:
@@ -285,6 +287,12 @@ const char* to_string(Confusion confusion) {
 Confusion confusion_of(const EvalPair& pair, const EvalSubmap& a, const FoundPose& found) {
   constexpr double kSameTurn_deg = 15.0;
   constexpr double kAlong_deg = 20.0;
+  constexpr double kNear_m = 1.0;
+  constexpr double kNear_deg = 8.0;
+  const PoseError error = pose_error(pair, found);
+  if (error.metres <= kNear_m && error.degrees <= kNear_deg) {
+    return Confusion::near;
+  }
   if (pair.overlap <= kNegativeOverlap) {
     return Confusion::elsewhere;
   }

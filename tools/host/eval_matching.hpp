@@ -62,6 +62,7 @@ std::vector<PoseDecision> pose_decisions(const std::vector<EvalPair>& pairs,
 
 /// How a wrong pose came about, by what it looks like.
 enum class Confusion {
+  near,       ///< no confusion: within a metre and 8 degrees; mostly submaps that are bent in themselves
   elsewhere,  ///< the pair does not overlap at all: another place that looks alike
   half_turn,  ///< turned by 180 degrees
   quarter_turn,

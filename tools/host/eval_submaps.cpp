@@ -166,20 +166,22 @@ TruthOfLive::TruthOfLive(const std::vector<StampedPose>& live, const std::vector
 bool TruthOfLive::correct(double seconds, const Pose2& live_T_base, Pose2& truth_T_base) const {
   const auto after = std::lower_bound(anchors_.begin(), anchors_.end(), seconds,
                                       [](const Anchor& anchor, double s) { return anchor.seconds < s; });
-  const Anchor* const next = after != anchors_.end() ? &*after : nullptr;
-  const Anchor* const last = after != anchors_.begin() ? &*(after - 1) : nullptr;
-  const auto near = [&](const Anchor* anchor) {
-    return anchor != nullptr && translation(between(anchor->live, live_T_base)) <= kTruthReach_m;
-  };
-  const auto carried = [&](const Anchor* anchor) { return compose(anchor->truth, between(anchor->live, live_T_base)); };
-  if (near(last) && near(next)) {
-    const double share = (seconds - last->seconds) / std::max(next->seconds - last->seconds, 1e-9);
-    truth_T_base = blend(carried(last), carried(next), share);
-  } else if (near(last) || near(next)) {
-    truth_T_base = carried(near(last) ? last : next);
-  } else {
+  // By the neighbours that lie within reach.
+  std::vector<Anchor> near;
+  std::vector<Pose2> carried;
+  for (auto it = after == anchors_.begin() ? after : after - 1; it != anchors_.end() && it <= after; ++it) {
+    const Pose2 anchor_T_base = between(it->live, live_T_base);
+    if (translation(anchor_T_base) <= kTruthReach_m) {
+      near.push_back(*it);
+      carried.push_back(compose(it->truth, anchor_T_base));
+    }
+  }
+  if (near.empty()) {
     return false;
   }
+  const double way_s = std::max(near.back().seconds - near.front().seconds, 1e-9);
+  const double share = near.size() == 2 ? (seconds - near.front().seconds) / way_s : 0.0;
+  truth_T_base = blend(carried.front(), carried.back(), share);
   return true;
 }
 

@@ -154,7 +154,8 @@ class RegistrationEvaluation {
                            {"score", "kind", "a", "b", "overlap", "value", "true_x", "true_y", "true_theta", "found_x",
                             "found_y", "found_theta", "metres", "degrees"})),
         kinds_(joined(joined({"log", "frames"}, curve_columns()),
-                      {"score", "positives", "wrong", "turned 180", "turned 90", "slid", "shifted", "other"})) {}
+                      {"score", "positives", "wrong", "near", "turned 180", "turned 90", "slid", "shifted", "other"})) {
+  }
 
   void run() {
     for (const EvalBuilding& building : load_buildings(options_.common)) {
@@ -307,8 +308,8 @@ class RegistrationEvaluation {
     }
     using host::Confusion;
     std::vector<std::string> row = joined(name, {std::to_string(positives), std::to_string(wrong_positives)});
-    for (const Confusion kind :
-         {Confusion::half_turn, Confusion::quarter_turn, Confusion::slid, Confusion::shifted, Confusion::other}) {
+    for (const Confusion kind : {Confusion::near, Confusion::half_turn, Confusion::quarter_turn, Confusion::slid,
+                                 Confusion::shifted, Confusion::other}) {
       row.push_back(std::to_string(counts[kind]));
     }
     kinds_.add(row);
