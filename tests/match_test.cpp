@@ -169,13 +169,3 @@ TEST_CASE("grids of different sizes are registered at their true pose, and forei
   CHECK(register_grids(a.image, empty, 0.05).empty());
   CHECK_THROWS_AS(register_grids(a.image, b.image, 0.0), std::invalid_argument);
 }
-
-TEST_CASE("confidence grows with each kind of evidence") {
-  const double base = confidence_of(0.8, 0.9, 0.1, 0.1);
-  CHECK(confidence_of(0.85, 0.9, 0.1, 0.1) > base);
-  CHECK(confidence_of(0.8, 0.95, 0.1, 0.1) > base);
-  CHECK(confidence_of(0.8, 0.9, 0.2, 0.1) > base);
-  CHECK(confidence_of(0.8, 0.9, 0.1, 0.2) > base);
-  CHECK(confidence_of(1.0, 1.0, 1.0, 1.0) <= 1.0);
-  CHECK(confidence_of(0.0, 0.0, -1.0, 0.0) >= 0.0);
-}

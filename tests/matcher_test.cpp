@@ -188,7 +188,7 @@ TEST_SUITE("matcher") {
     const Picture picture = golden_picture(golden::kPictureA);
     CHECK(bench.matcher.step());
     Features features = bench.carve();
-    REQUIRE(bench.matcher.begin_extract({picture.data(), picture.size()}, {}, features) == Status::ok);
+    REQUIRE(bench.matcher.begin_extract({picture.data(), picture.size()}, features) == Status::ok);
     int steps = 1;
     while (!bench.matcher.step()) {
       CHECK_FALSE(features.ready);
@@ -233,7 +233,7 @@ TEST_SUITE("matcher") {
     observed[(30 * 48 + 16) / 8] = 0;
     picture[30 * 48 + 16] = 51;
     Features features = bench.carve();
-    REQUIRE(bench.matcher.extract({picture.data(), picture.size()}, {observed.data(), observed.size()}, features) ==
+    REQUIRE(bench.matcher.extract({picture.data(), picture.size()}, features, {observed.data(), observed.size()}) ==
             Status::ok);
     CHECK(features.image[20 * 48 + 20] == doctest::Approx(1.0));
     CHECK(features.image[20 * 48 + 21] == doctest::Approx(0.2 - 0.5 * 0.8));
@@ -246,14 +246,14 @@ TEST_SUITE("matcher") {
     config.free_weight = 0.0F;
     Bench weightless(config);
     Features same = weightless.carve();
-    REQUIRE(weightless.matcher.extract({picture.data(), picture.size()}, {observed.data(), observed.size()}, same) ==
+    REQUIRE(weightless.matcher.extract({picture.data(), picture.size()}, same, {observed.data(), observed.size()}) ==
             Status::ok);
     CHECK(std::equal(same.image.begin(), same.image.end(), paper.image.begin()));
     CHECK(std::memcmp(same.filter.data(), paper.filter.data(), same.filter.size() * sizeof(Complex)) == 0);
 
     // Free space without an obstacle is no structure, whatever its outline.
     const Picture flat(48 * 48, 0);
-    CHECK(bench.matcher.extract({flat.data(), flat.size()}, {observed.data(), observed.size()}, features) ==
+    CHECK(bench.matcher.extract({flat.data(), flat.size()}, features, {observed.data(), observed.size()}) ==
           Status::degenerate);
   }
 
@@ -263,7 +263,7 @@ TEST_SUITE("matcher") {
     for (const std::uint8_t value : std::initializer_list<std::uint8_t>{0, 1, 128, 255}) {
       const Picture flat(48 * 48, value);
       Features features = bench.carve();
-      CHECK(bench.matcher.extract({flat.data(), flat.size()}, {}, features) == Status::degenerate);
+      CHECK(bench.matcher.extract({flat.data(), flat.size()}, features) == Status::degenerate);
       CHECK_FALSE(features.ready);
       CHECK(bench.matcher.match(good, features) == Status::degenerate);
       CHECK(bench.matcher.hypotheses().empty());
@@ -272,7 +272,7 @@ TEST_SUITE("matcher") {
     // A flat picture written into features that were ready takes their readiness away.
     Features reused = good;
     const Picture flat(48 * 48, 0);
-    CHECK(bench.matcher.extract({flat.data(), flat.size()}, {}, reused) == Status::degenerate);
+    CHECK(bench.matcher.extract({flat.data(), flat.size()}, reused) == Status::degenerate);
     CHECK_FALSE(reused.ready);
   }
 
@@ -304,8 +304,8 @@ TEST_SUITE("matcher") {
       for (const Picture& b : pictures) {
         Features fa = bench.carve();
         Features fb = bench.carve();
-        const Status extracted_a = bench.matcher.extract({a.data(), a.size()}, {}, fa);
-        const Status extracted_b = bench.matcher.extract({b.data(), b.size()}, {}, fb);
+        const Status extracted_a = bench.matcher.extract({a.data(), a.size()}, fa);
+        const Status extracted_b = bench.matcher.extract({b.data(), b.size()}, fb);
         const Status matched = bench.matcher.match(fa, fb);
         CHECK((matched == Status::ok) == (extracted_a == Status::ok && extracted_b == Status::ok));
         CHECK(all_finite(bench.matcher.hypotheses()));
@@ -339,7 +339,7 @@ TEST_SUITE("matcher") {
       Features query = bench.carve();
       for (int pass = 0; pass < 2; ++pass) {  // the second query lies where the first did
         const Picture& picture = queries[pass];
-        REQUIRE(bench.matcher.extract({picture.data(), picture.size()}, {}, query) == Status::ok);
+        REQUIRE(bench.matcher.extract({picture.data(), picture.size()}, query) == Status::ok);
         bench.matcher.keep_turned(query);
         for (const Features& other : features) {
           REQUIRE(bench.matcher.match(other, query) == Status::ok);
@@ -410,6 +410,12 @@ TEST_SUITE("matcher") {
                                    with([](auto& c) { c.lowpass_sigma = -1.0F; }),
                                    with([](auto& c) { c.whitening_floor = 0.0F; }),
                                    with([](auto& c) { c.edge_margin = NAN; }),
+                                   with([](auto& c) { c.rotation = static_cast<RotationMode>(4); }),
+                                   with([](auto& c) { c.high_pass = static_cast<HighPass>(3); }),
+                                   with([](auto& c) { c.peak_fit = static_cast<PeakFit>(2); }),
+                                   with([](auto& c) { c.preprocessing = static_cast<Preprocessing>(3); }),
+                                   with([](auto& c) { c.min_peak = -0.1F; }),
+                                   with([](auto& c) { c.min_overlap = 0.0F; }),
                                    with([](auto& c) { c.turns_per_bin = 9; }),
                                    with([](auto& c) { c.kept_turns = 1; }),
                                    with([](auto& c) {

@@ -1,5 +1,9 @@
 #include "mellin/collection/registration.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
 #include "mellin/collection/screening.hpp"
 
 namespace mellin {
@@ -11,9 +15,21 @@ constexpr std::size_t kLinesPerStep = 32;
 constexpr double kSameDistance_m = 0.3;
 constexpr double kSameAngle_rad = 0.05;
 
+/// Hypotheses that differ by this are rivals: at most one can be right.
+constexpr double kElsewhere_m = 1.0;
+constexpr double kElsewhere_rad = 0.2;
+
+/// Share of the grids' side: at larger shifts they hardly overlap.
+constexpr double kFarthestShift = 0.75;
+
 bool same_place(const Pose2& p, const Pose2& q) {
   const Pose2 off = between(p, q);
   return translation(off) < kSameDistance_m && off.theta < kSameAngle_rad && off.theta > -kSameAngle_rad;
+}
+
+bool elsewhere(const Pose2& p, const Pose2& q) {
+  const Pose2 off = between(p, q);
+  return translation(off) >= kElsewhere_m || std::fabs(off.theta) >= kElsewhere_rad;
 }
 
 }  // namespace
@@ -61,7 +77,8 @@ bool SpectralRegistration::begin_picture(const GridView& grid, Stage stage) {
 }
 
 void SpectralRegistration::begin_extract(Features& out, Stage stage) {
-  stage_ = matcher_.begin_extract(memory_.picture.obstacles, memory_.picture.observed, out) == Status::ok ? stage : Stage::idle;
+  stage_ = matcher_.begin_extract(memory_.picture.obstacles, out, memory_.picture.observed) == Status::ok ? stage
+                                                                                                          : Stage::idle;
 }
 
 bool SpectralRegistration::step() {
@@ -130,17 +147,32 @@ void SpectralRegistration::classify_other() {
   stage_ = classes.ok() ? Stage::verify : Stage::idle;
 }
 
-void SpectralRegistration::verify_candidate() {
-  const Hypothesis& h = matcher_.hypotheses()[next_];
-  const Result<Agreement> agreement = verify(class_a_, class_b_, h.a_T_b, config_.verification);
-  if (agreement.ok()) {
-    PlaceHypothesis candidate;
-    candidate.a_T_b = h.a_T_b;
-    candidate.peak = h.peak;
-    candidate.agreement = agreement.value().score;
-    candidate.overlap = agreement.value().overlap;
-    insert_by_agreement(candidates_, candidate);
+/// The surface that a peak lies on is cyclic: a large shift may as well be one the other way. What was observed
+/// decides.
+SpectralRegistration::Candidate SpectralRegistration::unwrapped(const Hypothesis& hypothesis) const {
+  const Pose2& p = hypothesis.a_T_b;
+  const double period = static_cast<double>(b_.cell_m) * config_.grid_side;
+  const double shifts_x[] = {p.x, p.x - std::copysign(period, p.x)};
+  const double shifts_y[] = {p.y, p.y - std::copysign(period, p.y)};
+  Candidate best{p, hypothesis.peak, -1.0F, 0.0F};
+  for (const double x : shifts_x) {
+    for (const double y : shifts_y) {
+      if (std::fabs(x) > kFarthestShift * period || std::fabs(y) > kFarthestShift * period) {
+        continue;
+      }
+      const Result<Agreement> agreement = verify_obstacles(class_a_, class_b_, {x, y, p.theta}, config_.verification);
+      if (agreement.ok() && agreement.value().score > best.agreement) {
+        best.a_T_b = {x, y, p.theta};
+        best.agreement = agreement.value().score;
+      }
+    }
   }
+  best.rank = best.agreement * std::sqrt(std::max(best.peak, 0.0F));
+  return best;
+}
+
+void SpectralRegistration::verify_candidate() {
+  insert_candidate(unwrapped(matcher_.hypotheses()[next_]));
   ++next_;
   if (next_ >= matcher_.hypotheses().size()) {
     next_ = 0;
@@ -148,20 +180,38 @@ void SpectralRegistration::verify_candidate() {
   }
 }
 
+/// Of candidates that alignment would make one, the best stays.
+void SpectralRegistration::insert_candidate(const Candidate& candidate) {
+  for (std::size_t i = candidates_.size(); i-- > 0;) {
+    if (same_place(candidates_[i].a_T_b, candidate.a_T_b)) {
+      if (candidates_[i].rank >= candidate.rank) {
+        return;
+      }
+      candidates_.erase(i);
+    }
+  }
+  std::size_t at = 0;
+  while (at < candidates_.size() && candidates_[at].rank >= candidate.rank) {
+    ++at;
+  }
+  candidates_.insert(at, candidate);
+}
+
 void SpectralRegistration::begin_alignment() {
   stage_ = Stage::idle;
-  if (next_ >= candidates_.size() || next_ >= config_.aligned) {
-    return;
+  if (next_ < candidates_.size() && next_ < config_.aligned) {
+    const float agreement = candidates_[next_].agreement;
+    if (agreement >= config_.aligned_from && agreement >= config_.aligned_share * candidates_[0].agreement &&
+        alignment_.begin(candidates_[next_].a_T_b) == Status::ok) {
+      stage_ = Stage::align;
+      return;
+    }
   }
-  const float agreement = candidates_[next_].agreement;
-  if (agreement >= config_.aligned_from && agreement >= config_.aligned_share * candidates_[0].agreement &&
-      alignment_.begin(candidates_[next_].a_T_b) == Status::ok) {
-    stage_ = Stage::align;
-  }
+  judge_hypotheses();
 }
 
 void SpectralRegistration::finish_alignment() {
-  PlaceHypothesis candidate = candidates_[next_];
+  const Candidate& candidate = candidates_[next_];
   ++next_;
   const Result<AlignmentResult> aligned = alignment_.result();
   if (aligned.ok()) {
@@ -173,15 +223,41 @@ void SpectralRegistration::finish_alignment() {
     const Result<Agreement> agreement = verify(class_a_, class_b_, r.a_T_b, config_.verification);
     Sym3 in_b;
     if (!known && agreement.ok() && invert(r.information + diagonal(1e-6, 1e-6, 1e-6), in_b)) {
-      candidate.a_T_b = r.a_T_b;
-      candidate.covariance = rotate(in_b, r.a_T_b.theta);
-      candidate.inlier_share = r.inlier_share;
-      candidate.agreement = agreement.value().score * r.inlier_share;
-      candidate.overlap = agreement.value().overlap;
-      insert_by_agreement(hypotheses_, candidate);
+      PlaceHypothesis place;
+      place.a_T_b = r.a_T_b;
+      place.covariance = rotate(in_b, r.a_T_b.theta);
+      place.peak = candidate.peak;
+      place.inlier_share = r.inlier_share;
+      place.agreement = agreement.value().score * r.inlier_share;
+      place.overlap = agreement.value().overlap;
+      insert_by_agreement(hypotheses_, place);
     }
   }
   begin_alignment();
+}
+
+/// Each hypothesis' confidence, which depends on the others, and their order by it.
+void SpectralRegistration::judge_hypotheses() {
+  for (PlaceHypothesis& place : hypotheses_) {
+    PoseEvidence evidence;
+    evidence.agreement = place.inlier_share > 0.0F ? place.agreement / place.inlier_share : 0.0F;
+    evidence.inlier_share = place.inlier_share;
+    evidence.overlap = place.overlap;
+    evidence.peak = place.peak;
+    for (const PlaceHypothesis& other : hypotheses_) {
+      if (elsewhere(place.a_T_b, other.a_T_b)) {
+        evidence.rival_strength = std::max(evidence.rival_strength, other.agreement);
+        evidence.rival_peak = std::max(evidence.rival_peak, other.peak);
+      }
+    }
+    place.confidence = confidence(evidence, config_.confidence);
+  }
+  // By insertion: they are few, and std::stable_sort would ask for a heap.
+  for (std::size_t i = 1; i < hypotheses_.size(); ++i) {
+    for (std::size_t k = i; k > 0 && hypotheses_[k].confidence > hypotheses_[k - 1].confidence; --k) {
+      std::swap(hypotheses_[k], hypotheses_[k - 1]);
+    }
+  }
 }
 
 }  // namespace mellin

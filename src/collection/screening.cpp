@@ -63,21 +63,23 @@ Span<const std::uint8_t> SpectralScreening::digest_bytes(std::uint32_t index) co
 }
 
 Features SpectralScreening::cached_features(std::uint32_t index) const {
-  const std::uint16_t side = config_.matcher.side;
   const std::size_t slot = index;
   Features f;
-  f.image = memory_.images.subspan(slot * Features::image_count(side), Features::image_count(side));
-  f.filter = memory_.filters.subspan(slot * Features::filter_count(side), Features::filter_count(side));
+  f.image =
+      memory_.images.subspan(slot * Features::image_count(config_.matcher), Features::image_count(config_.matcher));
+  f.filter =
+      memory_.filters.subspan(slot * Features::filter_count(config_.matcher), Features::filter_count(config_.matcher));
   const std::size_t polar = Features::polar_count(config_.matcher);
   f.polar = memory_.polar.subspan(slot * polar, polar);
   f.floor = memory_.floors[slot];
+  f.curvature = memory_.curvatures[slot];
   f.ready = memory_.ready[slot] != 0;
   return f;
 }
 
 void SpectralScreening::begin_features(std::uint32_t index, Features& out, Stage stage) {
   const DigestOut digest = digest_out(index);
-  stage_ = matcher_.begin_extract(digest.obstacles, digest.observed, out) == Status::ok ? stage : Stage::idle;
+  stage_ = matcher_.begin_extract(digest.obstacles, out, digest.observed) == Status::ok ? stage : Stage::idle;
 }
 
 void SpectralScreening::begin_caching(std::uint32_t index) {
@@ -164,6 +166,7 @@ bool SpectralScreening::step() {
     case Stage::features:
       if (matcher_.step()) {
         memory_.floors[a_] = features_a_.floor;
+        memory_.curvatures[a_] = features_a_.curvature;
         memory_.ready[a_] = features_a_.ready ? 1 : 0;
         stage_ = Stage::idle;
       }

@@ -135,6 +135,7 @@ Status validate_matcher(const MatcherConfig& m, const Log& log) {
       {"turns_per_bin", number(m.turns_per_bin), 0.0F, 8.0F, true, "0 to 8"},
       {"kept_turns", number(m.kept_turns), 0.0F, number(m.side) * number(m.turns_per_bin), true,
        "0 to the pictures' side x turns_per_bin"},
+      {"min_overlap", m.min_overlap, 0.0F, 1.0F, false, "over 0, at most 1"},
       {"preprocessing", number(m.preprocessing), 0.0F, number(Preprocessing::blur), true, "a Preprocessing"},
       {"rotation", number(m.rotation), 0.0F, number(RotationMode::log_polar_scale), true, "a RotationMode"},
       {"high_pass", number(m.high_pass), 0.0F, number(HighPass::reddy), true, "a HighPass"},

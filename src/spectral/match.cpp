@@ -52,6 +52,9 @@ float Matcher::turn_variance() const {
 
 /// Where b's spectrum at this rotation is known, it need not be made.
 Matcher::Stage Matcher::begin_rotation() {
+  if (config_.masked) {
+    return Stage::masked_turned_rows;
+  }
   turned_ = memory_.first;
   const bool kept = b_.image.data() == query_ && rotation_.peaks()[rotation_index_].scale == 1.0F;
   if (!kept) {
@@ -76,17 +79,21 @@ void Matcher::keep_turn() {
   }
 }
 
-void Matcher::transform_turned_rows(std::size_t first, std::size_t count) {
-  const std::size_t side = config_.side;
+SinCosF Matcher::turn_under_way() const {
   const SinCos turn = sincos(turned_angle());
   // A picture enlarged by s is read at coordinates smaller by s.
-  const double scale = static_cast<double>(rotation_.peaks()[rotation_index_].scale);
-  const SinCosF turn_f{static_cast<float>(turn.sin / scale), static_cast<float>(turn.cos / scale)};
+  const auto scale = static_cast<double>(rotation_.peaks()[rotation_index_].scale);
+  return {static_cast<float>(turn.sin / scale), static_cast<float>(turn.cos / scale)};
+}
+
+void Matcher::transform_turned_rows(std::size_t first, std::size_t count) {
+  const std::size_t side = config_.side;
+  const SinCosF turn = turn_under_way();
   const ImageView image{b_.image, config_.side};
   for (std::size_t r = first; r < first + count; r += Fft2::kBlock) {
     const std::size_t rows = std::min(Fft2::kBlock, first + count - r);
     for (std::size_t i = 0; i < rows; ++i) {
-      turned_row(image, turn_f, r + i, fft_.kernels(), memory_.rows.data() + i * side);
+      turned_row(image, turn, r + i, fft_.kernels(), memory_.rows.data() + i * side);
     }
     fft_.forward_rows(memory_.rows.data(), r, rows, turned_);
   }
@@ -153,6 +160,9 @@ void Matcher::search_surface_rows(std::size_t first, std::size_t count) {
 /// Row `row` of the surface under way. Rows are asked for in ascending order, cyclically; `begins` says which is the
 /// first. Where there are lanes a block of rows takes no longer than one.
 const float* Matcher::surface_row(std::size_t row, bool begins) {
+  if (config_.masked) {
+    return masked_surface_row(row);
+  }
   constexpr std::size_t kRows = kFftLanes > 1 ? Fft2::kBlock : 1;
   const std::size_t side = config_.side;
   if (begins || row < block_row_ || row >= block_row_ + kRows) {
@@ -187,13 +197,28 @@ void Matcher::locate_peak(const Fft2::Peak& peak) {
   hypothesis.peak = peak.value;
   hypothesis.rotation_peak = rotation.strength;
   hypothesis.scale = rotation.scale;
-  const double quarter = 0.25 * static_cast<double>(side);
-  const PeakSpread spread = spread_by_gradient(curvature(window, radius), gradient_noise_, quarter);
-  const double fit = fit_variance(config_, PeakKind::whitened);
+  const PeakSpread spread = translation_spread(window, radius);
   const double square_m = pixel_m * pixel_m;
-  hypothesis.covariance = {static_cast<float>((spread.xx + fit) * square_m), static_cast<float>(spread.xy * square_m),
-                           static_cast<float>((spread.yy + fit) * square_m), rotation.variance + turn_variance()};
+  hypothesis.covariance = {static_cast<float>(spread.xx * square_m), static_cast<float>(spread.xy * square_m),
+                           static_cast<float>(spread.yy * square_m), rotation.variance + turn_variance()};
   add_hypothesis(hypothesis);
+}
+
+/// Of the peak under way, pixels squared: see PeakCovariance.
+PeakSpread Matcher::translation_spread(const PeakWindow& window, int radius) const {
+  // Lines' worth of independent samples. Whitening leaves a lower peak than a coefficient would be, which counts more.
+  const double lines = config_.masked ? 6.0 : 48.0;
+  const auto side = static_cast<double>(config_.side);
+  const double r = std::min(1.0, static_cast<double>(peak_.value));
+  const PictureCurvature& own = a_.curvature;
+  const Curvature shape = config_.masked ? curvature(window, radius)
+                                         : Curvature{r * static_cast<double>(own.xx), r * static_cast<double>(own.xy),
+                                                     r * static_cast<double>(own.yy)};
+  PeakSpread spread = spread_by_noise(shape, (1.0 - r * r) / (r * lines * side), 0.25 * side);
+  const double fit = fit_variance(config_, config_.masked ? PeakKind::coefficient : PeakKind::whitened);
+  spread.xx += fit;
+  spread.yy += fit;
+  return spread;
 }
 
 /// Keeps the list sorted; of two that say the same (within a pixel and an angular bin) the better one stays.

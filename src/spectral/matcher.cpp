@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <iterator>
 
 #include "mellin/grid/digest.hpp"
 
@@ -21,8 +22,8 @@ void fill_lowpass(float sigma, Span<float> lowpass) {
 }
 
 bool fits(const Features& features, const MatcherConfig& config) {
-  return (features.image.empty() || features.image.size() == Features::image_count(config.side)) &&
-         (features.filter.empty() || features.filter.size() == Features::filter_count(config.side)) &&
+  return (features.image.empty() || features.image.size() == Features::image_count(config)) &&
+         (features.filter.empty() || features.filter.size() == Features::filter_count(config)) &&
          features.polar.size() == Features::polar_count(config);
 }
 
@@ -37,6 +38,7 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUn
   const bool enough = memory.first.size() == spectrum_size(config.side) &&
                       memory.second.size() == memory.first.size() && memory.rows.size() == Fft2::kBlock * side &&
                       memory.lines.size() == 2 * (kFftLanes + 1) * side && memory.lowpass.size() == side &&
+                      memory.masked.size() == (config.masked ? 7 * spectrum_size(config.side) : 0) &&
                       memory.turns.size() == config.kept_turns * spectrum_size(config.side);
   if (!enough) {
     return Status::insufficient_memory;
@@ -56,35 +58,17 @@ Status Matcher::init(const MatcherConfig& config, const Memory& memory, VectorUn
   query_ = nullptr;
   margin_ = EdgeBlur::margin(config.side, config.edge_margin);
   fill_lowpass(config.lowpass_sigma, memory.lowpass);
-  weigh_filter();
+  double sum = 0.0;
+  for (const float weight : memory.lowpass) {
+    sum += static_cast<double>(weight);
+  }
+  filter_scale_ = static_cast<float>(1.0 / (sum * sum));
   return Status::ok;
 }
 
-/// The sums over the low-pass that scale the surface to 1 for equal pictures, and tell its gradient's variance where
-/// all phases are random: (2 pi)^2 sum(fx^2 W^2) / sum(W)^2, W the product of the weights of both axes. Pictures differ
-/// by walls rather than by pixels, so fewer phases are independent: they grow with the side, not with its square
-/// (measured, tests/matcher_covariance_test.cpp).
-void Matcher::weigh_filter() {
-  constexpr double kIndependentLines = 64.0;
-  const std::size_t side = config_.side;
-  double sum = 0.0;
-  double square_sum = 0.0;
-  double slope_sum = 0.0;
-  for (std::size_t i = 0; i < side; ++i) {
-    const auto weight = static_cast<double>(memory_.lowpass[i]);
-    const double radians = kTwoPi * static_cast<double>(std::min(i, side - i)) / static_cast<double>(side);
-    sum += weight;
-    square_sum += weight * weight;
-    slope_sum += weight * weight * radians * radians;
-  }
-  filter_scale_ = static_cast<float>(1.0 / (sum * sum));
-  const double lines = static_cast<double>(side) / kIndependentLines;
-  gradient_noise_ = std::max(1.0, lines) * slope_sum * square_sum / (sum * sum * sum * sum);
-}
-
-Status Matcher::begin_extract(Span<const std::uint8_t> obstacles, Span<const std::uint8_t> observed, Features& out) {
-  const bool valid = fft_.side() > 0 && obstacles.size() == Features::image_count(config_.side) &&
-                     (observed.empty() || observed.size() == mask_bytes(config_.side)) && fits(out, config_);
+Status Matcher::begin_extract(Span<const std::uint8_t> obstacles, Features& out, Span<const std::uint8_t> observed) {
+  const bool valid = fft_.side() > 0 && obstacles.size() == std::size_t{config_.side} * config_.side &&
+                     fits(out, config_) && (observed.empty() || observed.size() == mask_bytes(config_.side));
   assert(valid);
   stage_ = Stage::idle;
   out.ready = false;
@@ -100,6 +84,7 @@ Status Matcher::begin_extract(Span<const std::uint8_t> obstacles, Span<const std
   lowest_ = 255;
   highest_ = 0;
   sum_ = 0.0;
+  std::fill(std::begin(moments_), std::end(moments_), 0.0);
   status_ = Status::ok;
   stage_ = Stage::load;
   line_ = 0;
@@ -161,12 +146,18 @@ std::size_t Matcher::lines_of(Stage stage) const {
   switch (stage) {
     case Stage::load:
     case Stage::picture_rows:
+    case Stage::masked_rows:
+    case Stage::masked_turned_rows:
+    case Stage::masked_search:
     case Stage::turned_rows:
     case Stage::surface_rows:
       return side;
     case Stage::blur_edges:
       return EdgeBlur::lines(config_.side, margin_);
     case Stage::picture_columns:
+    case Stage::masked_columns:
+    case Stage::masked_turned_columns:
+    case Stage::masked_correlation:
     case Stage::whiten:
     case Stage::turned_columns:
       return side / 2 + 1;
@@ -192,6 +183,18 @@ void Matcher::run(Stage stage, std::size_t first, std::size_t count) {
       return transform_picture_rows(first, count);
     case Stage::picture_columns:
       return transform_picture_columns(first, count);
+    case Stage::masked_rows:
+      return transform_masked_rows(first, count);
+    case Stage::masked_columns:
+      return transform_masked_columns(first, count);
+    case Stage::masked_turned_rows:
+      return transform_masked_turned_rows(first, count);
+    case Stage::masked_turned_columns:
+      return transform_masked_turned_columns(first, count);
+    case Stage::masked_correlation:
+      return correlate_masked_columns(first, count);
+    case Stage::masked_search:
+      return search_masked_rows(first, count);
     case Stage::whiten:
       return whiten_columns(first, count);
     case Stage::turned_rows:
@@ -226,11 +229,16 @@ Matcher::Stage Matcher::after(Stage stage) {
     case Stage::blur_edges:
       return Stage::picture_rows;
     case Stage::picture_rows:
+      end_curvature();
+      return config_.masked ? Stage::masked_rows : Stage::picture_columns;
+    case Stage::masked_rows:
+      return out_->filter.empty() ? Stage::picture_columns : Stage::masked_columns;
+    case Stage::masked_columns:
       return Stage::picture_columns;
     case Stage::picture_columns:
       end_magnitudes();
       rotation_.begin_describe(out_->polar);
-      return out_->filter.empty() ? Stage::describe_rotation : Stage::whiten;
+      return out_->filter.empty() || config_.masked ? Stage::describe_rotation : Stage::whiten;
     case Stage::whiten:
       return Stage::describe_rotation;
     case Stage::describe_rotation:
@@ -245,17 +253,23 @@ Matcher::Stage Matcher::after(Stage stage) {
     case Stage::turned_columns:
       keep_turn();
       return Stage::filter_columns;
+    case Stage::masked_turned_rows:
+      return Stage::masked_turned_columns;
     case Stage::filter_columns:
+    case Stage::masked_turned_columns:
       half_turn_ = false;
       begin_surface();
-      return Stage::surface_rows;
+      return config_.masked ? Stage::masked_correlation : Stage::surface_rows;
+    case Stage::masked_correlation:
+      return Stage::masked_search;
     case Stage::surface_rows:
+    case Stage::masked_search:
       return Stage::locate_peak;
     case Stage::locate_peak:
       if (!half_turn_) {
         half_turn_ = true;
         begin_surface();
-        return Stage::surface_rows;
+        return config_.masked ? Stage::masked_correlation : Stage::surface_rows;
       }
       return ++rotation_index_ == rotation_count() ? Stage::idle : begin_rotation();
     case Stage::idle:
@@ -264,8 +278,8 @@ Matcher::Stage Matcher::after(Stage stage) {
   return Stage::idle;
 }
 
-Status Matcher::extract(Span<const std::uint8_t> obstacles, Span<const std::uint8_t> observed, Features& out) {
-  const Status begun = begin_extract(obstacles, observed, out);
+Status Matcher::extract(Span<const std::uint8_t> obstacles, Features& out, Span<const std::uint8_t> observed) {
+  const Status begun = begin_extract(obstacles, out, observed);
   while (!step()) {
   }
   return begun == Status::ok ? status_ : begun;

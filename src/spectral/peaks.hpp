@@ -40,10 +40,11 @@ class PeakWindow {
   float at(int dx, int dy) const { return values_[index(dx, dy)]; }
 
  private:
+  static constexpr std::size_t kWidth = 2 * kMaxRadius + 1;
   static constexpr std::size_t index(int dx, int dy) {
-    return static_cast<std::size_t>((dy + kMaxRadius) * (2 * kMaxRadius + 1) + dx + kMaxRadius);
+    return static_cast<std::size_t>(dy + kMaxRadius) * kWidth + static_cast<std::size_t>(dx + kMaxRadius);
   }
-  float values_[std::size_t{(2 * kMaxRadius + 1) * (2 * kMaxRadius + 1)}] = {};
+  float values_[kWidth * kWidth] = {};
 };
 
 /// From the highest pixel to the peak, pixels.

@@ -140,25 +140,57 @@ Evidence gather(const ClassView& onto, const ClassView& from, const Pose2& onto_
   return evidence;
 }
 
-Evidence gather_obstacles(const ClassView& onto, const ClassObstacles& from, const Pose2& onto_T_from) {
-  const Placing place(onto, from.view, onto_T_from);
-  Evidence evidence;
-  for (const ClassCell cell : from.cells) {
-    const unsigned there = class_at(onto, place(cell.column, cell.row));
-    evidence.hits += (there & kClassNear) / kClassNear;
-    evidence.conflicts += (there & kClassClear) / kClassClear;
-  }
-  return evidence;
-}
-
-float share(double part, double whole) { return whole > 0.0 ? static_cast<float>(std::min(1.0, part / whole)) : 0.0F; }
-
 /// Among the next eight.
 bool any_occupied(const std::uint8_t* cells) {
   std::uint64_t eight = 0;
   std::memcpy(&eight, cells, sizeof eight);
   return (eight & 0x0101010101010101U * kClassOccupied) != 0;
 }
+
+/// Calls visit(column, row, occupied) for every occupied cell, row by row, and for some others.
+template <class Visit>
+void visit_obstacles(const ClassView& view, Visit&& visit) {
+  for (std::uint16_t row = 0; row < view.side; ++row) {
+    const std::uint8_t* const cells = view.cells.data() + static_cast<std::size_t>(row) * view.side;
+    std::uint16_t column = 0;
+    while (column < view.side) {
+      if (column + sizeof(std::uint64_t) <= view.side && !any_occupied(cells + column)) {
+        column = static_cast<std::uint16_t>(column + sizeof(std::uint64_t));
+        continue;
+      }
+      visit(column, row, (cells[column] & kClassOccupied) != 0);
+      ++column;
+    }
+  }
+}
+
+void add_obstacle(const ClassView& onto, Point2f point, Evidence& evidence) {
+  const unsigned there = class_at(onto, point);
+  evidence.hits += (there & kClassNear) / kClassNear;
+  evidence.conflicts += (there & kClassClear) / kClassClear;
+}
+
+Evidence gather_obstacles(const ClassView& onto, const ClassObstacles& from, const Pose2& onto_T_from) {
+  const Placing place(onto, from.view, onto_T_from);
+  Evidence evidence;
+  for (const ClassCell cell : from.cells) {
+    add_obstacle(onto, place(cell.column, cell.row), evidence);
+  }
+  return evidence;
+}
+
+Evidence gather_obstacles(const ClassView& onto, const ClassView& from, const Pose2& onto_T_from) {
+  const Placing place(onto, from, onto_T_from);
+  Evidence evidence;
+  visit_obstacles(from, [&](std::uint16_t column, std::uint16_t row, bool occupied) {
+    if (occupied) {
+      add_obstacle(onto, place(column, row), evidence);
+    }
+  });
+  return evidence;
+}
+
+float share(double part, double whole) { return whole > 0.0 ? static_cast<float>(std::min(1.0, part / whole)) : 0.0F; }
 
 bool valid(const ClassView& a, const ClassView& b, const Pose2& a_T_b) {
   return valid(a.cells, a.side, a.cell_m) && valid(b.cells, b.side, b.cell_m) && is_finite(a_T_b);
@@ -262,20 +294,11 @@ Result<Span<const ClassCell>> obstacles(const ClassView& view, Span<ClassCell> o
     return Status::invalid_argument;
   }
   std::size_t count = 0;
-  for (std::uint16_t row = 0; row < view.side; ++row) {
-    const std::uint8_t* const cells = view.cells.data() + static_cast<std::size_t>(row) * view.side;
-    std::uint16_t column = 0;
-    while (column < view.side) {
-      if (column + sizeof(std::uint64_t) <= view.side && !any_occupied(cells + column)) {
-        column = static_cast<std::uint16_t>(column + sizeof(std::uint64_t));
-        continue;
-      }
-      // Written always and kept where it counts: obstacles are too scattered to guess.
-      out.data()[count] = {column, row};
-      count += (cells[column] & kClassOccupied) != 0 ? 1U : 0U;
-      ++column;
-    }
-  }
+  visit_obstacles(view, [&](std::uint16_t column, std::uint16_t row, bool occupied) {
+    // Written always and kept where it counts: obstacles are too scattered to guess.
+    out.data()[count] = {column, row};
+    count += occupied ? 1U : 0U;
+  });
   return Span<const ClassCell>(out.first(count));
 }
 
@@ -290,6 +313,17 @@ Result<Agreement> verify_obstacles(const ClassObstacles& a, const ClassObstacles
   const Evidence on_a = gather_obstacles(a.view, b, a_T_b);
   const Evidence on_b = gather_obstacles(b.view, a, inverse(a_T_b));
   return judge(a.view, b.view, on_a, on_b, config);
+}
+
+Result<Agreement> verify_obstacles(const ClassView& a, const ClassView& b, const Pose2& a_T_b,
+                                   const VerificationConfig& config) {
+  if (!valid(config)) {
+    return Status::invalid_config;
+  }
+  if (!valid(a, b, a_T_b)) {
+    return Status::invalid_argument;
+  }
+  return judge(a, b, gather_obstacles(a, b, a_T_b), gather_obstacles(b, a, inverse(a_T_b)), config);
 }
 
 }  // namespace mellin

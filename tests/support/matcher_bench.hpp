@@ -40,7 +40,7 @@ class Bench {
   }
   Features extract(const Picture& picture, FeatureUse use = FeatureUse::both) {
     Features features = carve(use);
-    REQUIRE(matcher.extract({picture.data(), picture.size()}, {}, features) == Status::ok);
+    REQUIRE(matcher.extract({picture.data(), picture.size()}, features) == Status::ok);
     return features;
   }
   HypothesisList match(const Picture& a, const Picture& b) {

@@ -167,7 +167,7 @@ struct Bench {
             extract(pixels_a, a.memory) == mellin::Status::ok && extract(pixels_b, b.memory) == mellin::Status::ok;
   }
   mellin::Status extract(const std::vector<std::uint8_t>& pixels, mellin::Features& out) {
-    return matcher.extract(Span<const std::uint8_t>(pixels.data(), pixels.size()), {}, out);
+    return matcher.extract(Span<const std::uint8_t>(pixels.data(), pixels.size()), out);
   }
 
   mellin::MatcherConfig config;

@@ -114,7 +114,7 @@ class PairMatcher {
     digest.side = config.side;
     require(make_digest(grid, span(worker.scratch), digest), "digest");
     out.features = out.memory.carve([&](auto& arena) { return Features::carve(arena, config); });
-    const Status status = worker.matcher.extract(digest.obstacles, digest.observed, out.features);
+    const Status status = worker.matcher.extract(digest.obstacles, out.features, digest.observed);
     if (status != Status::degenerate) {
       require(status, "features");
     }

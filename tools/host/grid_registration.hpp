@@ -1,10 +1,11 @@
-// Registration of two occupancy grids of any size: the library's matcher, alignment and verification in a row, with
+// Registration of two occupancy grids of any size: the library's registration over both, padded to one square, with
 // memory from the heap.
 #pragma once
 
 #include <vector>
 
 #include "host/grid_image.hpp"
+#include "mellin/collection/registration.hpp"
 #include "mellin/core/se2.hpp"
 
 namespace mellin::host {
@@ -13,26 +14,20 @@ namespace mellin::host {
 /// right, y up.
 struct GridHypothesis {
   Pose2 a_T_b;
-  double confidence = 0.0;  ///< 0 to 1; see confidence_of()
+  double confidence = 0.0;  ///< probability that the pose is right (spectral/confidence.hpp)
   double peak = 0.0;        ///< of the phase-only matched filter
-  double agreement = 0.0;   ///< Agreement::score after alignment
-  double inlier_share = 0.0;
-  double overlap = 0.0;
-  double margin = 0.0;
+  double agreement = 0.0;   ///< PlaceHypothesis::agreement
 };
 
 /// Hypotheses from this confidence on are a match.
 inline constexpr double kAcceptedConfidence = 0.5;
 
-/// A monotone function of the evidence, 0 to 1, not calibrated as a probability: a logistic of
-///   agreement * inlier_share + margin / 2 + peak / 4,
-/// where inlier_share is that of the alignment, and margin, cut at 0.3, is by how much agreement * inlier_share exceeds
-/// that of the best hypothesis elsewhere (buildings that look alike when turned agree with both). Its centre and width
-/// were set by eye on submaps of the intel, fr079 and aces logs, on no log held back.
-double confidence_of(double agreement, double inlier_share, double margin, double peak);
+/// How grids of at most `largest` cells along a side are registered: pixels and verification near 0.2 m, as many
+/// hypotheses aligned as can be. Throws std::invalid_argument where the grids are too large.
+RegistrationConfig grid_registration_config(std::size_t largest, double resolution_m);
 
 /// All distinct hypotheses, best confidence first; empty where a grid shows nothing. `resolution_m` is the edge of a
-/// cell in both. Throws std::invalid_argument where it is not a positive number.
+/// cell in both. Throws std::invalid_argument where it is not a positive number, or the grids are too large.
 std::vector<GridHypothesis> register_grids(const OccupancyImage& a, const OccupancyImage& b, double resolution_m);
 
 }  // namespace mellin::host

@@ -27,6 +27,8 @@ void visit_matcher(const std::string& prefix, C& c, Visit& visit) {
   visit((prefix + "free_weight").c_str(), c.free_weight);
   visit((prefix + "turns_per_bin").c_str(), c.turns_per_bin);
   visit((prefix + "kept_turns").c_str(), c.kept_turns);
+  visit((prefix + "masked").c_str(), c.masked);
+  visit((prefix + "min_overlap").c_str(), c.min_overlap);
 }
 
 /// Calls visit(name, field) for each setting. Fields that resolved() overwrites are not among them.

@@ -110,7 +110,7 @@ std::vector<Decision> decisions_of(const std::vector<host::EvalPair>& pairs,
   return decisions;
 }
 
-/// Issue goals for submaps in random orientation; empty where there is none.
+/// What it is measured against, for submaps in random orientation.
 struct Goal {
   double average_precision = 0.0;
   double recall_99 = 0.0;

@@ -21,10 +21,11 @@ struct PlaceHypothesis {
   float agreement = 0.0F;     ///< of what both observed, 0 to 1; after registration times inlier_share
   float overlap = 0.0F;       ///< shared observed area over the smaller one; from registration only
   float inlier_share = 0.0F;  ///< of the aligned points; from registration only
+  float confidence = 0.0F;    ///< probability that the pose is right (spectral/confidence.hpp); from registration only
 };
 
-inline constexpr std::size_t kMaxPlaceHypotheses = 4;
-/// Best first (by agreement).
+inline constexpr std::size_t kMaxPlaceHypotheses = 6;
+/// Best first: by agreement, after registration by confidence.
 using PlaceHypotheses = FixedList<PlaceHypothesis, kMaxPlaceHypotheses>;
 
 /// Keeps a digest of each submap under an index and compares two of them. One job at a time, in bounded slices.

@@ -8,20 +8,30 @@
 #include "mellin/core/arena.hpp"
 #include "mellin/grid/digest.hpp"
 #include "mellin/spectral/alignment.hpp"
+#include "mellin/spectral/confidence.hpp"
 #include "mellin/spectral/matcher.hpp"
 #include "mellin/spectral/verification.hpp"
 
 namespace mellin {
 
+/// Registration asks what was observed of several translation peaks; they cost little beside the transforms.
+constexpr MatcherConfig registration_matcher() {
+  MatcherConfig config;
+  config.translation_peaks = 4;
+  return config;
+}
+
 struct RegistrationConfig {
   std::uint16_t grid_side = 768;  ///< of the submaps
-  MatcherConfig matcher;          ///< its side is the scale of registration: grid_side over a power of two
+  MatcherConfig matcher =
+      registration_matcher();  ///< its side is the scale of registration: grid_side over a power of two
   VerificationConfig verification;
   std::uint16_t class_side = 192;  ///< cells of the grids that are compared; divides grid_side
   AlignmentConfig alignment;
-  std::uint8_t aligned = 2;    ///< hypotheses that are aligned, best agreement first: 1 to kMaxPlaceHypotheses …
+  std::uint8_t aligned = 2;    ///< hypotheses that are aligned, best first: 1 to kMaxPlaceHypotheses …
   float aligned_share = 0.6F;  ///< … as long as they agree at least this share as well as the best one …
   float aligned_from = 0.1F;   ///< … and at least so well
+  ConfidenceModel confidence;
 };
 
 class SpectralRegistration final : public GridMatcher {
@@ -106,13 +116,24 @@ class SpectralRegistration final : public GridMatcher {
     align,
   };
 
+  /// A hypothesis of the matcher, verified.
+  struct Candidate {
+    Pose2 a_T_b;
+    float peak = 0.0F;
+    float agreement = 0.0F;
+    float rank = 0.0F;
+  };
+
   bool begin_picture(const GridView& grid, Stage stage);
   void begin_extract(Features& out, Stage stage);
   void classify_query();
   void classify_other();
   void verify_candidate();
+  Candidate unwrapped(const Hypothesis& hypothesis) const;
+  void insert_candidate(const Candidate& candidate);
   void begin_alignment();
   void finish_alignment();
+  void judge_hypotheses();
 
   RegistrationConfig config_;
   Memory memory_;
@@ -126,7 +147,7 @@ class SpectralRegistration final : public GridMatcher {
   ClassView class_a_;
   ClassView class_b_;
   std::size_t next_ = 0;
-  PlaceHypotheses candidates_;
+  FixedList<Candidate, kMaxPlaceHypotheses> candidates_;  ///< best rank first
   PlaceHypotheses hypotheses_;
 };
 

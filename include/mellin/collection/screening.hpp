@@ -34,6 +34,7 @@ class SpectralScreening final : public DigestMatcher {
     Span<Complex> filters;
     Span<Complex> polar;
     Span<float> floors;
+    Span<PictureCurvature> curvatures;
     Span<std::uint8_t> ready;
     Features features_a;  ///< … or of the two that are compared
     Features features_b;
@@ -66,10 +67,11 @@ class SpectralScreening final : public DigestMatcher {
     }
     if (config.cache_features) {
       const std::size_t slots = config.max_submaps;
-      m.images = kept.template take<float>(slots * Features::image_count(side), Part::digests);
-      m.filters = kept.template take<Complex>(slots * Features::filter_count(side), Part::digests);
+      m.images = kept.template take<float>(slots * Features::image_count(config.matcher), Part::digests);
+      m.filters = kept.template take<Complex>(slots * Features::filter_count(config.matcher), Part::digests);
       m.polar = kept.template take<Complex>(slots * Features::polar_count(config.matcher), Part::digests);
       m.floors = kept.template take<float>(slots, Part::digests);
+      m.curvatures = kept.template take<PictureCurvature>(slots, Part::digests);
       m.ready = kept.template take<std::uint8_t>(slots, Part::digests);
     } else {
       m.features_a = Features::carve(work, config.matcher, FeatureUse::as_a);

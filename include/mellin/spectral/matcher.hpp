@@ -15,6 +15,7 @@
 
 #include "mellin/core/arena.hpp"
 #include "mellin/core/containers.hpp"
+#include "mellin/core/math.hpp"
 #include "mellin/core/se2.hpp"
 #include "mellin/core/span.hpp"
 #include "mellin/core/status.hpp"
@@ -27,8 +28,13 @@
 
 namespace mellin {
 
-/// Covariance of a registered pose from the shapes of its correlation peaks: x and y m^2, theta rad^2, theta taken for
-/// independent of the place.
+/// Covariance of a registered pose: x and y m^2, theta rad^2, theta taken for independent of the place.
+///
+/// For a correlation coefficient r the share 1 - r^2 of the other picture is unexplained: noise. It moves the peak by
+/// H^-1 times its gradient, H the peak's curvature, so that the covariance is (1 - r^2) / (r n) H^-1. n is how many
+/// independent samples the noise has: pictures differ by walls, not by pixels, so n grows with the side (measured,
+/// tests/matcher_covariance_test.cpp). A phase-only filter makes every peak sharp, in a corridor, too; there r is its
+/// peak, and H that of picture a's correlation with itself. Added is what the fit of a peak leans to.
 struct PeakCovariance {
   float xx = 0.0F;
   float xy = 0.0F;
@@ -56,6 +62,8 @@ struct MatchOptions {
   float min_rotation_peak = -1.0F;  ///< no translation is sought at rotations whose coefficient is lower
 };
 
+struct PeakSpread;
+
 class Matcher {
  public:
   struct Memory {
@@ -65,6 +73,7 @@ class Matcher {
     Span<float> rows;      ///< Fft2::kBlock rows of an image
     Span<Complex> lines;   ///< twice kFftLanes columns of a spectrum and one more
     Span<float> lowpass;   ///< along one axis
+    Span<Complex> masked;  ///< seven spectra, for MatcherConfig::masked
     RotationEstimator::Memory rotation;
     Span<Complex> turns;             ///< spectra of the query, turned and whitened, MatcherConfig::kept_turns of them
     Span<std::uint16_t> turn_place;  ///< of each angle: where in `turns`, from 1 on; 0: not there
@@ -85,6 +94,7 @@ class Matcher {
     m.rows = work.template take<float>(Fft2::kBlock * side, Part::spectral, Region::fast);
     m.lines = work.template take<Complex>(2 * (kFftLanes + 1) * side, Part::spectral, Region::fast);
     m.lowpass = tables.template take<float>(side, Part::spectral, Region::fast);
+    m.masked = work.template take<Complex>(config.masked ? 7 * spectrum_size(config.side) : 0, Part::spectral);
     m.rotation = RotationEstimator::carve(tables, work, config);
     m.turns = work.template take<Complex>(config.kept_turns * spectrum_size(config.side), Part::spectral);
     m.turn_place =
@@ -98,9 +108,10 @@ class Matcher {
   const MatcherConfig& config() const { return config_; }
 
   /// Starts making the features of a picture in `out`: its obstacles (side * side bytes) and the mask of what was
-  /// observed (mask_bytes(side), see digest.hpp; may be empty: nothing is known to be free then). All must live until
+  /// observed (mask_bytes(side), see digest.hpp; empty: nothing is known to be free, all counts as observed where
+  /// MatcherConfig::masked asks). All must live until
   /// the job is done. An unfinished earlier job is given up. invalid_argument: sizes do not hold.
-  Status begin_extract(Span<const std::uint8_t> obstacles, Span<const std::uint8_t> observed, Features& out);
+  Status begin_extract(Span<const std::uint8_t> obstacles, Features& out, Span<const std::uint8_t> observed = {});
   /// Starts matching; the memory of both must live and stay until the job is done, and they may be the same. An
   /// unfinished earlier job is given up. invalid_argument: sizes do not hold, or a has no filter, or b no image.
   /// degenerate: one of them is not ready; there are no hypotheses then.
@@ -120,7 +131,7 @@ class Matcher {
   const HypothesisList& hypotheses() const { return hypotheses_; }
 
   /// begin_extract() and all its steps. Status of both.
-  Status extract(Span<const std::uint8_t> obstacles, Span<const std::uint8_t> observed, Features& out);
+  Status extract(Span<const std::uint8_t> obstacles, Features& out, Span<const std::uint8_t> observed = {});
   /// begin_match() and all its steps. Status of both; see hypotheses().
   Status match(const Features& a, const Features& b, const MatchOptions& options = {});
 
@@ -130,10 +141,16 @@ class Matcher {
     load,
     blur_edges,
     picture_rows,
+    masked_rows,
+    masked_columns,
     picture_columns,
     whiten,
     describe_rotation,
     estimate_rotation,
+    masked_turned_rows,
+    masked_turned_columns,
+    masked_correlation,
+    masked_search,
     turned_rows,
     turned_columns,
     filter_columns,
@@ -149,8 +166,9 @@ class Matcher {
   void run(Stage stage, std::size_t first, std::size_t count);
   Stage after(Stage stage);
 
-  void weigh_filter();
   ImageView picture_image() const;
+  void add_curvature(std::size_t row);
+  void end_curvature();
   void load_rows(std::size_t first, std::size_t count);
   void blur_edges(std::size_t first, std::size_t count);
   void transform_picture_rows(std::size_t first, std::size_t count);
@@ -165,9 +183,22 @@ class Matcher {
   void transform_turned_rows(std::size_t first, std::size_t count);
   void whiten_turned_columns(std::size_t first, std::size_t count);
   void filter_turned_columns(std::size_t first, std::size_t count);
+  SinCosF turn_under_way() const;
+  void transform_masked_row(const float* picture, const float* mask, std::size_t row,
+                            const Span<Complex> (&spectra)[3]);
+  void transform_masked_rows(std::size_t first, std::size_t count);
+  void transform_masked_columns(std::size_t first, std::size_t count);
+  void transform_masked_turned_rows(std::size_t first, std::size_t count);
+  void transform_masked_turned_columns(std::size_t first, std::size_t count);
+  void correlate_masked_columns(std::size_t first, std::size_t count);
+  const float* masked_surface_row(std::size_t row);
+  void search_masked_rows(std::size_t first, std::size_t count);
+  Span<Complex> masked_spectrum_of_b(std::size_t i) const;
+  Span<Complex> masked_sum(std::size_t i) const;
   void begin_surface();
   void search_surface_rows(std::size_t first, std::size_t count);
   const float* surface_row(std::size_t row, bool begins);
+  PeakSpread translation_spread(const PeakWindow& window, int radius) const;
   void locate_peak(const Fft2::Peak& peak);
   /// Rotation peaks that are tried.
   std::size_t rotation_count() const;
@@ -181,7 +212,6 @@ class Matcher {
   EdgeBlur edge_blur_;
   std::uint16_t margin_ = 0;
   float filter_scale_ = 1.0F;
-  double gradient_noise_ = 0.0;  // of a surface of random phases, along an axis, per pixel squared
 
   Stage stage_ = Stage::idle;
   std::size_t line_ = 0;  // next line of the stage
@@ -192,7 +222,8 @@ class Matcher {
   Features* out_ = nullptr;
   std::uint8_t lowest_ = 0;  // of the picture's bytes
   std::uint8_t highest_ = 0;
-  double sum_ = 0.0;  // of magnitudes
+  double sum_ = 0.0;        // of magnitudes
+  double moments_[5] = {};  // of the picture: its sum, that of its squares, of squared differences along x, y and both
 
   Features a_;
   Features b_;

@@ -81,7 +81,7 @@ struct MatcherConfig {
   /// What observed free space counts in the picture that is matched, where an obstacle counts 1 and what was not
   /// observed 0: an obstacle on the other's free space then speaks against a shift as one on an obstacle speaks for it,
   /// and the unknown says nothing. 0 is the paper's way, which takes unobserved space for free (IV-B1). Without an
-  /// observed mask it has no effect. 0 … 4.
+  /// observed mask, or where `masked`, it has no effect. 0 … 4.
   float free_weight = 1.0F;
   /// b is turned by multiples of an angular bin (180 degrees / side) over this, which is the angle that a hypothesis
   /// says then: 1 … 8; 0: by the very angle of the peak.
@@ -90,6 +90,13 @@ struct MatcherConfig {
   /// side * turns_per_bin: a spectrum's memory each. More than one picture is compared with it at half the cost. Has no
   /// influence on the results. Only with turns_per_bin.
   std::uint16_t kept_turns = 0;
+  /// Only what both pictures have observed counts in the translation step (IV-B1, masked registration [19]): its peak
+  /// is the normalised cross-correlation of the overlap, -1 … 1, without low-pass or whitening. Takes the observed
+  /// masks of pictures, and seven spectra of memory more; a comparison costs some four times as much. The correlation
+  /// is cyclic: borders that nobody observed keep the two ends of a picture apart.
+  bool masked = false;
+  /// Overlaps of less than this share of the smaller observed area have no peak, over 0 up to 1. For `masked`.
+  float min_overlap = 0.3F;
   /// Lines (rows, columns, rings) that one step() treats; 0 means a whole pass.
   std::uint16_t lines_per_step = 0;
 };
@@ -103,8 +110,9 @@ constexpr bool is_valid(const MatcherConfig& config) {
          config.whitening_floor <= 1.0F && config.edge_margin > 0.0F && config.edge_margin <= 0.1F &&
          config.preprocessing <= Preprocessing::blur && config.rotation <= RotationMode::log_polar_scale &&
          config.high_pass <= HighPass::reddy && config.peak_fit <= PeakFit::gaussian && config.min_peak >= 0.0F &&
-         config.min_peak <= 1.0F && config.free_weight >= 0.0F && config.free_weight <= 4.0F &&
-         config.turns_per_bin <= 8 && config.kept_turns <= config.side * config.turns_per_bin;
+         config.min_peak <= 1.0F && config.min_overlap > 0.0F && config.min_overlap <= 1.0F &&
+         config.free_weight >= 0.0F && config.free_weight <= 4.0F && config.turns_per_bin <= 8 &&
+         config.kept_turns <= config.side * config.turns_per_bin;
 }
 
 /// The paper taken at its word: phase-only matched filters without low-pass for rotation with scale and for

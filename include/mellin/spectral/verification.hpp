@@ -96,4 +96,8 @@ struct ClassObstacles {
 Result<Agreement> verify_obstacles(const ClassObstacles& a, const ClassObstacles& b, const Pose2& a_T_b,
                                    const VerificationConfig& config = {});
 
+/// The same without lists of the obstacles, which are looked for among all cells, eight at a time.
+Result<Agreement> verify_obstacles(const ClassView& a, const ClassView& b, const Pose2& a_T_b,
+                                   const VerificationConfig& config = {});
+
 }  // namespace mellin
