@@ -1,9 +1,9 @@
 #include "host/runtime.hpp"
 
 #include <fftw3.h>
+#include <time.h>
 
 #include <algorithm>
-#include <chrono>
 #include <initializer_list>
 #include <memory>
 #include <stdexcept>
@@ -25,8 +25,11 @@ constexpr std::size_t kQueries = 9;       // that are screened against all
 constexpr std::size_t kLeastSamples = 9;  // of a median …
 constexpr double kLeastSeconds = 0.2;     // … which take so long at least
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+/// Of the processor, by this thread: others on the machine do not count.
+double seconds_now() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 double median(std::vector<double> values) {
@@ -39,11 +42,11 @@ double median(std::vector<double> values) {
 template <class Run>
 double median_seconds(Run&& run) {
   std::vector<double> samples;
-  const auto begin = std::chrono::steady_clock::now();
-  while (samples.size() < kLeastSamples || seconds_since(begin) < kLeastSeconds) {
-    const auto start = std::chrono::steady_clock::now();
+  const double begin = seconds_now();
+  while (samples.size() < kLeastSamples || seconds_now() - begin < kLeastSeconds) {
+    const double start = seconds_now();
     run(samples.size());
-    samples.push_back(seconds_since(start));
+    samples.push_back(seconds_now() - start);
   }
   return median(std::move(samples));
 }
@@ -134,13 +137,13 @@ double screen_us(const std::vector<EvalSubmap>& submaps, std::uint16_t side, std
   std::vector<double> samples;
   for (std::size_t k = 0; k < kQueries; ++k) {
     const std::size_t query = (k * submaps.size()) / kQueries;
-    const auto start = std::chrono::steady_clock::now();
+    const double start = seconds_now();
     for (std::size_t i = 0; i < submaps.size(); ++i) {
       if (i != query) {
         screening.compare(i, query);
       }
     }
-    samples.push_back(1e6 * seconds_since(start) / static_cast<double>(submaps.size() - 1));
+    samples.push_back(1e6 * (seconds_now() - start) / static_cast<double>(submaps.size() - 1));
   }
   return median(std::move(samples));
 }

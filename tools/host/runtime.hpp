@@ -1,5 +1,5 @@
 // What the stages of place recognition take, on submaps, and beside them, in the same run, what the transforms in them
-// would take by FFTW (the paper's Table I). Times are medians, of one thread.
+// would take by FFTW (the paper's Table I). Times are medians of the processor's time, one thread.
 #pragma once
 
 #include <cstddef>
