@@ -59,6 +59,8 @@ TEST_SUITE("matcher") {
     };
     MatcherConfig rings = config_of(48);
     rings.peak_fit = PeakFit::centre_of_mass;
+    check("rings, observed free space", rings, golden::kFreeSpace);
+    rings.free_weight = 0.0F;
     check("rings", rings, golden::kHypotheses);
     MatcherConfig linear = rings;
     linear.rotation = RotationMode::linear_polar;
@@ -66,6 +68,7 @@ TEST_SUITE("matcher") {
     linear.com_radius = 2;
     check("linear polar", linear, golden::kLinearPolar);
     MatcherConfig logarithmic = config_of(48);
+    logarithmic.free_weight = 0.0F;
     logarithmic.rotation = RotationMode::log_polar;
     logarithmic.peak_fit = PeakFit::gaussian;
     check("log-polar", logarithmic, golden::kLogPolar);

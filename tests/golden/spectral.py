@@ -90,9 +90,11 @@ def whitened(spectrum):
     return spectrum / (np.abs(spectrum) + floor), floor
 
 
-def features(picture, mode='rings', high_pass='radius'):
+def features(picture, mode='rings', high_pass='radius', free=None):
+    """free: the mask of what was observed, where free space counts -1."""
     n = len(picture)
-    a = edge_blurred(picture / 255., max(2, int(n * np.float32(.04))))
+    share = picture / 255.
+    a = edge_blurred(share if free is None else np.where(free, 2 * share - 1, share), max(2, int(n * np.float32(.04))))
     full = np.fft.fft2(a)
     white, floor = whitened(full)
     weighted = high_passed(np.abs(full), high_pass)
@@ -240,5 +242,6 @@ seen = np.hypot(x - 3, y + 2) < 19, np.hypot(x + 2.3, y - 1) < 20
 octets('kMaskA', np.packbits(seen[0].ravel(), bitorder='little'))
 octets('kMaskB', np.packbits(seen[1].ravel(), bitorder='little'))
 hypotheses('kMasked', run(seen=seen))
+hypotheses('kFreeSpace', match(features(a, free=seen[0]), features(b, free=seen[1])))
 hypotheses('kPaper', run('log_polar_scale', 'reddy', share=.9, low_pass=1e9))
 print('\n}  // namespace golden\n// clang-format on')
