@@ -51,7 +51,7 @@ EvalFigure figure_5(const std::string& method) {
   for (const double scale : {50.0, 25.0, 12.5, 6.25}) {
     EvalPanel panel{"Scale: " + fixed(scale, 2) + " %", {}};
     for (const char* preprocessing : {"erosion", "blur"}) {
-      panel.curves.push_back({preprocessing, {40, scale, 1, preprocessing, method}});
+      panel.curves.push_back({preprocessing, {40, scale, EvalCurve::kOwnFit, preprocessing, method}});
     }
     figure.panels.push_back(panel);
   }
