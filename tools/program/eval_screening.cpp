@@ -187,14 +187,10 @@ class ScreeningEvaluation {
     Found result;
     for (const char* score : {"peak", "agreement"}) {
       const std::vector<host::PoseDecision> poses = host::pose_decisions(pairs, found, score_named(score));
-      const std::vector<std::string> row{building,
-                                         frames,
-                                         std::to_string(curve.scans),
-                                         fixed(curve.scale, 2),
-                                         std::to_string(curve.com),
-                                         curve.preprocessing,
-                                         curve.method,
-                                         score};
+      std::vector<std::string> row{building, frames};
+      const std::vector<std::string> cells = curve.cells();
+      row.insert(row.end(), cells.begin(), cells.end());
+      row.emplace_back(score);
       std::vector<std::string> printed = row;
       printed.push_back(std::to_string(pairs.size()));
       for (const Judged judged : kJudged) {
