@@ -114,7 +114,10 @@ MatcherConfig EvalCurve::matcher() const {
     config = paper_matcher(side());
   }
   config.side = side();
-  config.com_radius = static_cast<std::uint8_t>(com);
+  if (com != kOwnFit) {
+    config.peak_fit = PeakFit::centre_of_mass;
+    config.com_radius = static_cast<std::uint8_t>(com);
+  }
   config.preprocessing = preprocessing == "none"   ? Preprocessing::none
                          : preprocessing == "blur" ? Preprocessing::blur
                                                    : Preprocessing::erosion;
@@ -122,7 +125,8 @@ MatcherConfig EvalCurve::matcher() const {
 }
 
 std::vector<std::string> EvalCurve::cells() const {
-  return {std::to_string(scans), host::fixed(scale, 2), std::to_string(com), preprocessing, method};
+  return {std::to_string(scans), host::fixed(scale, 2), com == kOwnFit ? "own" : std::to_string(com), preprocessing,
+          method};
 }
 
 std::vector<std::string> curve_columns() { return {"scans", "scale", "com", "preprocessing", "method"}; }
@@ -148,7 +152,7 @@ std::vector<EvalCurve> EvalChoice::combinations() const {
     for (const double scale : or_else(scales, 25.0)) {
       for (const std::string& method : methods) {
         for (const std::string& prepared : or_else(preprocessing, std::string("erosion"))) {
-          for (const int radius : or_else(com, 1)) {
+          for (const int radius : or_else(com, EvalCurve::kOwnFit)) {
             out.push_back({k, scale, radius, prepared, method});
           }
         }
@@ -184,7 +188,7 @@ EvalFigure figure_of(const EvalChoice& choice, const std::string& title) {
       figure.panels.push_back({panel, {}});
     }
     figure.panels.back().curves.push_back(
-        {curve.method + ", " + curve.preprocessing + ", CoM" + std::to_string(curve.com), curve});
+        {curve.method + ", " + curve.preprocessing + ", CoM " + curve.cells()[2], curve});
   }
   return figure;
 }

@@ -73,7 +73,7 @@ EvalFigure figure_pipeline() {
   for (const std::uint16_t scans : kContexts) {
     EvalPanel panel{std::to_string(scans) + " scans", {}};
     for (const double scale : {50.0, 25.0, 12.5}) {
-      panel.curves.push_back({fixed(scale, 2) + " %", {scans, scale, 1, "erosion", "best"}});
+      panel.curves.push_back({fixed(scale, 2) + " %", {scans, scale, EvalCurve::kOwnFit, "erosion", "best"}});
     }
     figure.panels.push_back(panel);
   }
