@@ -10,6 +10,7 @@
 #include "host/file.hpp"
 #include "host/table.hpp"
 #include "host/tum.hpp"
+#include "mellin/config.hpp"
 
 namespace mellin::program {
 namespace {
@@ -106,6 +107,15 @@ host::SubmapFrames frames_named(const std::string& name) {
 
 host::PairScore score_named(const std::string& name) {
   return name == "agreement" ? host::PairScore::agreement : host::PairScore::peak;
+}
+
+RegistrationConfig registration_of(const EvalCurve& curve) {
+  Config config = desktop_profile();
+  config.registration_side = curve.side();
+  config.registration.matcher = curve.matcher();
+  config.registration.matcher.translation_peaks = registration_matcher().translation_peaks;
+  config.registration.aligned = kMaxPlaceHypotheses;
+  return resolved(config).registration;
 }
 
 MatcherConfig EvalCurve::matcher() const {

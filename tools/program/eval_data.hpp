@@ -112,6 +112,9 @@ struct EvalFigure {
 /// A panel for each number of scans and scale.
 EvalFigure figure_of(const EvalChoice& choice, const std::string& title);
 
+/// The whole registration as `mellin match` runs it: at the curve's scale, as many hypotheses aligned as can be.
+RegistrationConfig registration_of(const EvalCurve& curve);
+
 /// Scans a submap that the paper compares.
 inline constexpr std::uint16_t kContexts[] = {20, 40, 80};
 

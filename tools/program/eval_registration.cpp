@@ -40,7 +40,7 @@ struct Way {
 };
 const Way kByPeak{"peak", PairScore::peak, false};
 const Way kByAgreement{"agreement", PairScore::agreement, false};
-const Way kPipeline{"pipeline", PairScore::agreement, true};
+const Way kPipeline{"pipeline", PairScore::confidence, true};
 
 struct Figure {
   EvalFigure figure;
@@ -101,7 +101,7 @@ std::vector<Figure> figures_of(const RegistrationOptions& o) {
 bool right_among(std::vector<FoundPose> found, const host::EvalPair& pair, PairScore score, std::size_t rank,
                  const host::PoseLimits& limits) {
   std::stable_sort(found.begin(), found.end(), [score](const FoundPose& p, const FoundPose& q) {
-    return score == PairScore::peak ? p.peak > q.peak : p.agreement > q.agreement;
+    return host::score_of(p, score) > host::score_of(q, score);
   });
   for (std::size_t i = 0; i < std::min(rank, found.size()); ++i) {
     const host::PoseError error = host::pose_error(pair, found[i]);
@@ -207,10 +207,7 @@ class RegistrationEvaluation {
       variant.verified = kMaxMatchHypotheses;
       return host::match_pairs(set.submaps, pairs, variant, options_.common.threads);
     }
-    Config config = desktop_profile();
-    config.registration_side = curve.side();
-    config.registration.matcher = curve.matcher();
-    return host::register_pairs(set.submaps, pairs, resolved(config).registration, options_.common.threads);
+    return host::register_pairs(set.submaps, pairs, registration_of(curve), options_.common.threads);
   }
 
   /// Fills the tables for one curve; what the matcher finds serves both of its scores.
