@@ -91,7 +91,7 @@ class PairMatcher {
     Matcher& matcher = workers_[worker].matcher;
     require(matcher.match(a.features, b.features), "match");
     for (const Hypothesis& h : matcher.hypotheses()) {
-      FoundPose pose{h.a_T_b, static_cast<double>(h.peak), -1.0, -1.0, {}};
+      FoundPose pose{h.a_T_b, static_cast<double>(h.peak), -1.0};
       if (found.size() < variant_.verified) {
         const Result<Agreement> agreement = verify(a.classes, b.classes, h.a_T_b, verification_);
         require(agreement.status(), "verification");

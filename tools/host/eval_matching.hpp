@@ -19,7 +19,7 @@ struct FoundPose {
   /// Of what both observed, 0 to 1; from registration times the share of inliers. Negative: not looked at.
   double agreement = -1.0;
   double confidence = -1.0;  ///< that the pose is right; from registration only
-  PoseEvidence evidence;     ///< that it rests on; from registration only
+  PoseEvidence evidence{};   ///< that it rests on; from registration only
 };
 
 /// What the matcher is and what it is given.

@@ -21,12 +21,14 @@ using host::fixed;
 using host::Judged;
 
 constexpr std::size_t kBins = 10;
+constexpr std::size_t kOverlapTerm = 4;  // of confidence_terms()
 
 struct ConfidenceOptions {
   EvalOptions common;
   std::size_t fitted = 1;
   std::vector<std::uint16_t> scans{20, 40, 80};
   double scale = 25.0;
+  double least_overlap = 4.0;
   host::PoseLimits limits;
 };
 
@@ -82,6 +84,7 @@ class ConfidenceEvaluation {
       }
       std::vector<double> least(ConfidenceModel::kWeights, 0.0);
       least[0] = -1e9;
+      least[kOverlapTerm] = options_.least_overlap;
       report("fitted weights", "fitted", host::fit_logistic(samples, least), all);
     }
     host::write_file(options_.common.directory + "/confidence.csv", summary_.csv());
@@ -202,6 +205,12 @@ void add_eval_confidence(CLI::App& eval) {
   command->add_option("--scans", options->scans, "scans a submap")->delimiter(',')->default_str("20,40,80");
   command->add_option("--scale", options->scale, "of registration, per cent")
       ->check(CLI::IsMember({50.0, 25.0, 12.5}))
+      ->capture_default_str();
+  command
+      ->add_option("--least-overlap", options->least_overlap,
+                   "least weight of the overlap's term: poses that rest on a sliver of shared ground rank lower, which "
+                   "detection gains by and calibration hardly loses by")
+      ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
   command->callback([options] { ConfidenceEvaluation(*options).run(); });
 }
