@@ -123,6 +123,10 @@ MatcherConfig EvalCurve::matcher() const {
   if (method == "paper") {
     config = paper_matcher(side());
   }
+  if (method == "unobserved-free") {
+    config.free_weight = 0.0F;
+  }
+  config.masked = method == "masked";
   config.side = side();
   if (com != kOwnFit) {
     config.peak_fit = PeakFit::centre_of_mass;
@@ -173,9 +177,13 @@ std::vector<EvalCurve> EvalChoice::combinations() const {
 }
 
 void add_choice_options(CLI::App& command, EvalChoice& choice) {
-  command.add_option("--method", choice.methods, "matchers: best, paper")
+  command
+      .add_option(
+          "--method", choice.methods,
+          "matchers: best (the default configuration), paper (taken at its word), masked (Padfield's correlation of "
+          "what both observed), unobserved-free (the best, but unobserved space is free, as in the paper)")
       ->delimiter(',')
-      ->check(CLI::IsMember({"best", "paper"}))
+      ->check(CLI::IsMember({"best", "paper", "masked", "unobserved-free"}))
       ->default_str("best,paper");
   const std::string combined = "every combination instead of the figures: ";
   command.add_option("--scales", choice.scales, combined + "per cent of 768 pixels")
