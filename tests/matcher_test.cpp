@@ -236,6 +236,22 @@ TEST_SUITE("matcher") {
     CHECK(bench.matcher.hypotheses().empty());
   }
 
+  TEST_CASE("what a configuration needs is known at compile time, and bytes used are bytes required") {
+    constexpr MatcherConfig config = config_of(96);
+    constexpr std::size_t coefficient = 2 * sizeof(float);
+    static_assert(required_bytes(config, FeatureUse::as_b) ==
+                  96 * 96 * sizeof(float) + 48 * 49 * coefficient);  // picture and rings
+    static_assert(required_bytes(config, FeatureUse::both) - required_bytes(config, FeatureUse::as_b) ==
+                  96 * 49 * coefficient);                               // filter
+    static_assert(required_bytes(config) > 2 * 96 * 49 * coefficient);  // two spectra at least
+    std::vector<double> words(required_bytes(config) / sizeof(double));
+    Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(words.data()), required_bytes(config)));
+    Matcher matcher;
+    CHECK(matcher.init(config, Matcher::carve(arena, config)) == Status::ok);
+    CHECK(arena.ok());
+    CHECK(arena.use().total() == required_bytes(config));
+  }
+
   TEST_CASE("observed free space counts against obstacles, the unobserved not at all") {
     MatcherConfig config = config_of(48);
     config.free_weight = 0.5F;

@@ -56,7 +56,7 @@ class Bench {
   std::vector<std::vector<double>> feature_memory_;
 };
 
-inline MatcherConfig config_of(std::uint16_t side, float pixel_m = 1.0F) {
+constexpr MatcherConfig config_of(std::uint16_t side, float pixel_m = 1.0F) {
   MatcherConfig config;
   config.side = side;
   config.pixel_m = pixel_m;

@@ -59,4 +59,11 @@ struct Features {
   }
 };
 
+/// Bytes that one picture's features take from an arena.
+constexpr std::size_t required_bytes(const MatcherConfig& config, FeatureUse use) {
+  MeasureArena measure;
+  Features::carve(measure, config, use);
+  return measure.use().total();
+}
+
 }  // namespace mellin

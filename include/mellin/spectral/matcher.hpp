@@ -242,4 +242,11 @@ class Matcher {
   HypothesisList hypotheses_;
 };
 
+/// Bytes that a matcher takes from an arena, beside its own size and its pictures' features.
+constexpr std::size_t required_bytes(const MatcherConfig& config) {
+  MeasureArena measure;
+  Matcher::carve(measure, config);
+  return measure.use().total();
+}
+
 }  // namespace mellin
