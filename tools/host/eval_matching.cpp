@@ -241,6 +241,8 @@ double score_of(const FoundPose& pose, PairScore score) {
       return pose.peak;
     case PairScore::agreement:
       return pose.agreement;
+    case PairScore::rank:
+      return pose.agreement * std::sqrt(std::max(pose.peak, 0.0));
     case PairScore::confidence:
       break;
   }

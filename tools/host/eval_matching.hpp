@@ -45,6 +45,7 @@ std::vector<std::vector<FoundPose>> register_pairs(const std::vector<EvalSubmap>
 enum class PairScore {
   peak,        ///< the strongest peak, as the paper does
   agreement,   ///< the best agreement, as screening does
+  rank,        ///< agreement times the root of the peak, by which registration orders what it aligns
   confidence,  ///< the best confidence, as registration does
 };
 

@@ -106,7 +106,9 @@ host::SubmapFrames frames_named(const std::string& name) {
 }
 
 host::PairScore score_named(const std::string& name) {
-  return name == "agreement" ? host::PairScore::agreement : host::PairScore::peak;
+  return name == "agreement" ? host::PairScore::agreement
+         : name == "rank"    ? host::PairScore::rank
+                             : host::PairScore::peak;
 }
 
 RegistrationConfig registration_of(const EvalCurve& curve) {

@@ -185,7 +185,7 @@ class ScreeningEvaluation {
     const std::vector<std::vector<host::FoundPose>> found =
         host::match_pairs(set.submaps, pairs, variant, options_.common.threads);
     Found result;
-    for (const char* score : {"peak", "agreement"}) {
+    for (const char* score : {"peak", "agreement", "rank"}) {
       const std::vector<host::PoseDecision> poses = host::pose_decisions(pairs, found, score_named(score));
       std::vector<std::string> row{building, frames};
       const std::vector<std::string> cells = curve.cells();
@@ -237,7 +237,7 @@ class ScreeningEvaluation {
 
   void draw(const std::string& building, const std::string& frames, const EvalFigure& figure,
             const std::map<std::string, Found>& done) const {
-    for (const char* score : {"peak", "agreement"}) {
+    for (const char* score : {"peak", "agreement", "rank"}) {
       std::vector<host::PlotPanel> panels;
       for (const EvalPanel& panel : figure.panels) {
         host::PlotPanel plot{panel.title, {"Recall", 0.5, 1.0}, {"Precision", 0.5, 1.0}, {}, {}};
