@@ -22,5 +22,10 @@ else
   # Figs. 6 and 7, and the library's whole registration.
   "$mellin" eval registration "${logs[@]}" -o "$out/registration" "$@"
   "$mellin" eval registration "${logs[@]}" -o "$out/registration-aligned" --frames aligned --figures pipeline "$@"
+  # The probability of a pose, fitted on intel and aces, judged on fr079.
+  if [ ${#logs[@]} -eq 3 ]; then
+    "$mellin" eval confidence "${logs[0]}" "${logs[2]}" "${logs[1]}" --fit 2 -o "$out/confidence" "$@"
+  fi
 fi
 "$mellin" eval change -o "$out/change"
+"$mellin" eval runtime -o "$out/runtime"

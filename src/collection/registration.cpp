@@ -34,6 +34,22 @@ bool elsewhere(const Pose2& p, const Pose2& q) {
 
 }  // namespace
 
+PoseEvidence evidence_of(const PlaceHypotheses& hypotheses, std::size_t i) {
+  const PlaceHypothesis& place = hypotheses[i];
+  PoseEvidence evidence;
+  evidence.agreement = place.inlier_share > 0.0F ? place.agreement / place.inlier_share : 0.0F;
+  evidence.inlier_share = place.inlier_share;
+  evidence.overlap = place.overlap;
+  evidence.peak = place.peak;
+  for (const PlaceHypothesis& other : hypotheses) {
+    if (elsewhere(place.a_T_b, other.a_T_b)) {
+      evidence.rival_strength = std::max(evidence.rival_strength, other.agreement);
+      evidence.rival_peak = std::max(evidence.rival_peak, other.peak);
+    }
+  }
+  return evidence;
+}
+
 Status SpectralRegistration::init(const RegistrationConfig& config, const Memory& memory) {
   config_ = config;
   memory_ = memory;
@@ -238,19 +254,8 @@ void SpectralRegistration::finish_alignment() {
 
 /// Each hypothesis' confidence, which depends on the others, and their order by it.
 void SpectralRegistration::judge_hypotheses() {
-  for (PlaceHypothesis& place : hypotheses_) {
-    PoseEvidence evidence;
-    evidence.agreement = place.inlier_share > 0.0F ? place.agreement / place.inlier_share : 0.0F;
-    evidence.inlier_share = place.inlier_share;
-    evidence.overlap = place.overlap;
-    evidence.peak = place.peak;
-    for (const PlaceHypothesis& other : hypotheses_) {
-      if (elsewhere(place.a_T_b, other.a_T_b)) {
-        evidence.rival_strength = std::max(evidence.rival_strength, other.agreement);
-        evidence.rival_peak = std::max(evidence.rival_peak, other.peak);
-      }
-    }
-    place.confidence = confidence(evidence, config_.confidence);
+  for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
+    hypotheses_[i].confidence = confidence(evidence_of(hypotheses_, i), config_.confidence);
   }
   // By insertion: they are few, and std::stable_sort would ask for a heap.
   for (std::size_t i = 1; i < hypotheses_.size(); ++i) {

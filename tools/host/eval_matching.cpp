@@ -224,20 +224,33 @@ std::vector<std::vector<FoundPose>> register_pairs(const std::vector<EvalSubmap>
       require(matcher.begin(submaps[pairs[i].a].grid.view()), "registration");
       while (!matcher.step()) {
       }
-      for (const PlaceHypothesis& h : matcher.hypotheses()) {
-        found[i].push_back({h.a_T_b, static_cast<double>(h.peak), static_cast<double>(h.agreement)});
+      const PlaceHypotheses& hypotheses = matcher.hypotheses();
+      for (std::size_t k = 0; k < hypotheses.size(); ++k) {
+        const PlaceHypothesis& h = hypotheses[k];
+        found[i].push_back({h.a_T_b, static_cast<double>(h.peak), static_cast<double>(h.agreement),
+                            static_cast<double>(h.confidence), evidence_of(hypotheses, k)});
       }
     }
   });
   return found;
 }
 
+double score_of(const FoundPose& pose, PairScore score) {
+  switch (score) {
+    case PairScore::peak:
+      return pose.peak;
+    case PairScore::agreement:
+      return pose.agreement;
+    case PairScore::confidence:
+      break;
+  }
+  return pose.confidence;
+}
+
 const FoundPose* deciding(const std::vector<FoundPose>& found, PairScore score) {
   const FoundPose* best = nullptr;
   for (const FoundPose& pose : found) {
-    const bool better =
-        best != nullptr && (score == PairScore::peak ? pose.peak > best->peak : pose.agreement > best->agreement);
-    best = best == nullptr || better ? &pose : best;
+    best = best == nullptr || score_of(pose, score) > score_of(*best, score) ? &pose : best;
   }
   return best;
 }
@@ -255,7 +268,7 @@ std::vector<PoseDecision> pose_decisions(const std::vector<EvalPair>& pairs,
     PoseDecision d{-1.0, pairs[i].overlap >= kPositiveOverlap, kWrong_m, 180.0, pairs[i].weight};
     if (best != nullptr) {
       const PoseError error = pose_error(pairs[i], *best);
-      d.score = score == PairScore::peak ? best->peak : best->agreement;
+      d.score = score_of(*best, score);
       d.metres = error.metres;
       d.degrees = error.degrees;
     }

@@ -18,6 +18,8 @@ struct FoundPose {
   double peak = 0.0;
   /// Of what both observed, 0 to 1; from registration times the share of inliers. Negative: not looked at.
   double agreement = -1.0;
+  double confidence = -1.0;  ///< that the pose is right; from registration only
+  PoseEvidence evidence{};   ///< that it rests on; from registration only
 };
 
 /// What the matcher is and what it is given.
@@ -41,9 +43,12 @@ std::vector<std::vector<FoundPose>> register_pairs(const std::vector<EvalSubmap>
 
 /// By what a pair's score is taken from its hypotheses.
 enum class PairScore {
-  peak,       ///< the strongest peak, as the paper does
-  agreement,  ///< the best agreement, as screening and registration do
+  peak,        ///< the strongest peak, as the paper does
+  agreement,   ///< the best agreement, as screening does
+  confidence,  ///< the best confidence, as registration does
 };
+
+double score_of(const FoundPose& pose, PairScore score);
 
 /// The hypothesis that decides; nullptr where there is none.
 const FoundPose* deciding(const std::vector<FoundPose>& found, PairScore score);

@@ -18,6 +18,7 @@ void add_store(CLI::App& app);     ///< mellin store
 
 /// Kinds of `mellin eval`, added to that command.
 void add_eval_change(CLI::App& eval);
+void add_eval_confidence(CLI::App& eval);
 void add_eval_registration(CLI::App& eval);
 void add_eval_runtime(CLI::App& eval);
 void add_eval_screening(CLI::App& eval);

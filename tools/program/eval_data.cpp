@@ -10,6 +10,7 @@
 #include "host/file.hpp"
 #include "host/table.hpp"
 #include "host/tum.hpp"
+#include "mellin/config.hpp"
 
 namespace mellin::program {
 namespace {
@@ -108,13 +109,29 @@ host::PairScore score_named(const std::string& name) {
   return name == "agreement" ? host::PairScore::agreement : host::PairScore::peak;
 }
 
+RegistrationConfig registration_of(const EvalCurve& curve) {
+  Config config = desktop_profile();
+  config.registration_side = curve.side();
+  config.registration.matcher = curve.matcher();
+  config.registration.matcher.translation_peaks = registration_matcher().translation_peaks;
+  config.registration.aligned = kMaxPlaceHypotheses;
+  return resolved(config).registration;
+}
+
 MatcherConfig EvalCurve::matcher() const {
   MatcherConfig config;
   if (method == "paper") {
     config = paper_matcher(side());
   }
+  if (method == "unobserved-free") {
+    config.free_weight = 0.0F;
+  }
+  config.masked = method == "masked";
   config.side = side();
-  config.com_radius = static_cast<std::uint8_t>(com);
+  if (com != kOwnFit) {
+    config.peak_fit = PeakFit::centre_of_mass;
+    config.com_radius = static_cast<std::uint8_t>(com);
+  }
   config.preprocessing = preprocessing == "none"   ? Preprocessing::none
                          : preprocessing == "blur" ? Preprocessing::blur
                                                    : Preprocessing::erosion;
@@ -122,7 +139,8 @@ MatcherConfig EvalCurve::matcher() const {
 }
 
 std::vector<std::string> EvalCurve::cells() const {
-  return {std::to_string(scans), host::fixed(scale, 2), std::to_string(com), preprocessing, method};
+  return {std::to_string(scans), host::fixed(scale, 2), com == kOwnFit ? "own" : std::to_string(com), preprocessing,
+          method};
 }
 
 std::vector<std::string> curve_columns() { return {"scans", "scale", "com", "preprocessing", "method"}; }
@@ -148,7 +166,7 @@ std::vector<EvalCurve> EvalChoice::combinations() const {
     for (const double scale : or_else(scales, 25.0)) {
       for (const std::string& method : methods) {
         for (const std::string& prepared : or_else(preprocessing, std::string("erosion"))) {
-          for (const int radius : or_else(com, 1)) {
+          for (const int radius : or_else(com, EvalCurve::kOwnFit)) {
             out.push_back({k, scale, radius, prepared, method});
           }
         }
@@ -159,9 +177,13 @@ std::vector<EvalCurve> EvalChoice::combinations() const {
 }
 
 void add_choice_options(CLI::App& command, EvalChoice& choice) {
-  command.add_option("--method", choice.methods, "matchers: best, paper")
+  command
+      .add_option(
+          "--method", choice.methods,
+          "matchers: best (the default configuration), paper (taken at its word), masked (Padfield's correlation of "
+          "what both observed), unobserved-free (the best, but unobserved space is free, as in the paper)")
       ->delimiter(',')
-      ->check(CLI::IsMember({"best", "paper"}))
+      ->check(CLI::IsMember({"best", "paper", "masked", "unobserved-free"}))
       ->default_str("best,paper");
   const std::string combined = "every combination instead of the figures: ";
   command.add_option("--scales", choice.scales, combined + "per cent of 768 pixels")
@@ -184,7 +206,7 @@ EvalFigure figure_of(const EvalChoice& choice, const std::string& title) {
       figure.panels.push_back({panel, {}});
     }
     figure.panels.back().curves.push_back(
-        {curve.method + ", " + curve.preprocessing + ", CoM" + std::to_string(curve.com), curve});
+        {curve.method + ", " + curve.preprocessing + ", CoM " + curve.cells()[2], curve});
   }
   return figure;
 }

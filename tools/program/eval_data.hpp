@@ -69,7 +69,7 @@ std::vector<host::EvalPair> chosen_pairs(const std::vector<host::EvalPair>& pair
 struct EvalCurve {
   std::uint16_t scans = 40;
   double scale = 100.0;  ///< per cent of the submap's pixels
-  int com = 1;           ///< radius of the peak's centre of mass
+  int com = kOwnFit;     ///< radius of the peak's centre of mass, or how the matcher fits peaks by itself
   std::string preprocessing = "erosion";
   std::string method = "best";
 
@@ -80,6 +80,7 @@ struct EvalCurve {
   std::string key() const;
 
   static constexpr double kFullSide = 768.0;
+  static constexpr int kOwnFit = -1;
 };
 std::vector<std::string> curve_columns();
 
@@ -92,7 +93,7 @@ struct EvalChoice {
   std::vector<std::string> preprocessing;
 
   bool any() const { return !scales.empty() || !scans.empty() || !com.empty() || !preprocessing.empty(); }
-  /// Every combination; what was left open is 40 scans, 25 %, CoM1, erosion.
+  /// Every combination; what was left open is 40 scans, 25 %, the matcher's own fit of peaks, erosion.
   std::vector<EvalCurve> combinations() const;
 };
 /// --method, --scales, --scans, --com, --preprocessing.
@@ -110,6 +111,9 @@ struct EvalFigure {
 };
 /// A panel for each number of scans and scale.
 EvalFigure figure_of(const EvalChoice& choice, const std::string& title);
+
+/// The whole registration as `mellin match` runs it: at the curve's scale, as many hypotheses aligned as can be.
+RegistrationConfig registration_of(const EvalCurve& curve);
 
 /// Scans a submap that the paper compares.
 inline constexpr std::uint16_t kContexts[] = {20, 40, 80};

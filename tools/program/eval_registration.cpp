@@ -40,7 +40,7 @@ struct Way {
 };
 const Way kByPeak{"peak", PairScore::peak, false};
 const Way kByAgreement{"agreement", PairScore::agreement, false};
-const Way kPipeline{"pipeline", PairScore::agreement, true};
+const Way kPipeline{"pipeline", PairScore::confidence, true};
 
 struct Figure {
   EvalFigure figure;
@@ -73,7 +73,7 @@ EvalFigure figure_pipeline() {
   for (const std::uint16_t scans : kContexts) {
     EvalPanel panel{std::to_string(scans) + " scans", {}};
     for (const double scale : {50.0, 25.0, 12.5}) {
-      panel.curves.push_back({fixed(scale, 2) + " %", {scans, scale, 1, "erosion", "best"}});
+      panel.curves.push_back({fixed(scale, 2) + " %", {scans, scale, EvalCurve::kOwnFit, "erosion", "best"}});
     }
     figure.panels.push_back(panel);
   }
@@ -101,7 +101,7 @@ std::vector<Figure> figures_of(const RegistrationOptions& o) {
 bool right_among(std::vector<FoundPose> found, const host::EvalPair& pair, PairScore score, std::size_t rank,
                  const host::PoseLimits& limits) {
   std::stable_sort(found.begin(), found.end(), [score](const FoundPose& p, const FoundPose& q) {
-    return score == PairScore::peak ? p.peak > q.peak : p.agreement > q.agreement;
+    return host::score_of(p, score) > host::score_of(q, score);
   });
   for (std::size_t i = 0; i < std::min(rank, found.size()); ++i) {
     const host::PoseError error = host::pose_error(pair, found[i]);
@@ -207,10 +207,7 @@ class RegistrationEvaluation {
       variant.verified = kMaxMatchHypotheses;
       return host::match_pairs(set.submaps, pairs, variant, options_.common.threads);
     }
-    Config config = desktop_profile();
-    config.registration_side = curve.side();
-    config.registration.matcher = curve.matcher();
-    return host::register_pairs(set.submaps, pairs, resolved(config).registration, options_.common.threads);
+    return host::register_pairs(set.submaps, pairs, registration_of(curve), options_.common.threads);
   }
 
   /// Fills the tables for one curve; what the matcher finds serves both of its scores.

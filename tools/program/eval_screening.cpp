@@ -51,7 +51,7 @@ EvalFigure figure_5(const std::string& method) {
   for (const double scale : {50.0, 25.0, 12.5, 6.25}) {
     EvalPanel panel{"Scale: " + fixed(scale, 2) + " %", {}};
     for (const char* preprocessing : {"erosion", "blur"}) {
-      panel.curves.push_back({preprocessing, {40, scale, 1, preprocessing, method}});
+      panel.curves.push_back({preprocessing, {40, scale, EvalCurve::kOwnFit, preprocessing, method}});
     }
     figure.panels.push_back(panel);
   }
@@ -187,14 +187,10 @@ class ScreeningEvaluation {
     Found result;
     for (const char* score : {"peak", "agreement"}) {
       const std::vector<host::PoseDecision> poses = host::pose_decisions(pairs, found, score_named(score));
-      const std::vector<std::string> row{building,
-                                         frames,
-                                         std::to_string(curve.scans),
-                                         fixed(curve.scale, 2),
-                                         std::to_string(curve.com),
-                                         curve.preprocessing,
-                                         curve.method,
-                                         score};
+      std::vector<std::string> row{building, frames};
+      const std::vector<std::string> cells = curve.cells();
+      row.insert(row.end(), cells.begin(), cells.end());
+      row.emplace_back(score);
       std::vector<std::string> printed = row;
       printed.push_back(std::to_string(pairs.size()));
       for (const Judged judged : kJudged) {

@@ -34,6 +34,9 @@ struct RegistrationConfig {
   ConfidenceModel confidence;
 };
 
+/// What speaks for hypothesis `i` of a registration's, the best of the others as its rival.
+PoseEvidence evidence_of(const PlaceHypotheses& hypotheses, std::size_t i);
+
 class SpectralRegistration final : public GridMatcher {
  public:
   struct Memory {
