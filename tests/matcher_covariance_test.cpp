@@ -160,6 +160,20 @@ TEST_SUITE("matcher_covariance") {
     }
   }
 
+  TEST_CASE("the variance does not depend on how many more peaks are asked for") {
+    const std::vector<Wall> walls = office(7);
+    const Picture a = look(walls, {}, 96);
+    Random random(5, 0);
+    const Picture b = look(without(walls, 0.3, random), {0.7, -0.5, 0.6}, 96);
+    MatcherConfig config = with_fit(96, PeakFit::gaussian, 1);
+    const PeakCovariance one = Bench(config).match(a, b)[0].covariance;
+    config.translation_peaks = 4;
+    const PeakCovariance four = Bench(config).match(a, b)[0].covariance;
+    CHECK(four.xx == doctest::Approx(one.xx));
+    CHECK(four.xy == doctest::Approx(one.xy));
+    CHECK(four.yy == doctest::Approx(one.yy));
+  }
+
   TEST_CASE("more differences, more variance") {
     const MatcherConfig config = with_fit(96, PeakFit::gaussian, 1);
     Bench bench(config);

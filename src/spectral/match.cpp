@@ -209,7 +209,7 @@ PeakSpread Matcher::translation_spread(const PeakWindow& window, int radius) con
   // Lines' worth of independent samples. Whitening leaves a lower peak than a coefficient would be, which counts more.
   const double lines = config_.masked ? 6.0 : 48.0;
   const auto side = static_cast<double>(config_.side);
-  const double r = std::min(1.0, static_cast<double>(peak_.value));
+  const double r = std::min(1.0, static_cast<double>(window.at(0, 0)));
   const PictureCurvature& own = a_.curvature;
   const Curvature shape = config_.masked ? curvature(window, radius)
                                          : Curvature{r * static_cast<double>(own.xx), r * static_cast<double>(own.xy),

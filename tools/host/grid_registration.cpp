@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "host/heap_arena.hpp"
 #include "mellin/collection/registration.hpp"
 
 namespace mellin::host {
@@ -60,17 +61,8 @@ unsigned halvings_for(std::size_t largest, double resolution_m) {
   return halvings;
 }
 
-/// A grid in the middle of a square one.
-struct Padded {
-  std::vector<std::uint8_t> cells;
-  std::uint16_t side = 0;
-  float cell_m = 0.0F;
-  Pose2 centre_T_corner;  ///< from the picture's frame to the submap's
-  GridView view() const { return {{cells.data(), cells.size()}, side, cell_m}; }
-};
-
-Padded pad(const OccupancyImage& image, std::uint16_t side, double resolution_m) {
-  Padded padded{
+PaddedGrid pad(const OccupancyImage& image, std::uint16_t side, double resolution_m) {
+  PaddedGrid padded{
       std::vector<std::uint8_t>(std::size_t{side} * side, kUnobserved), side, static_cast<float>(resolution_m), {}};
   const std::size_t left = (side - image.width) / 2;
   const std::size_t below = (side - image.height) / 2;
@@ -83,30 +75,6 @@ Padded pad(const OccupancyImage& image, std::uint16_t side, double resolution_m)
                             (static_cast<double>(below) - half) * resolution_m, 0.0};
   return padded;
 }
-
-/// The library's registration with memory from the heap.
-class Registration {
- public:
-  explicit Registration(const RegistrationConfig& config) {
-    MeasureArena measure;
-    SpectralRegistration::carve(measure, config);
-    words_.resize(measure.use().total() / sizeof(double));
-    Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(words_.data()), measure.use().total()));
-    require(registration_.init(config, SpectralRegistration::carve(arena, config)), "registration");
-  }
-
-  const PlaceHypotheses& run(const GridView& a, const GridView& b) {
-    require(registration_.set_query(b), "grid B");
-    require(registration_.begin(a), "grid A");
-    while (!registration_.step()) {
-    }
-    return registration_.hypotheses();
-  }
-
- private:
-  std::vector<double> words_;
-  SpectralRegistration registration_;
-};
 
 }  // namespace
 
@@ -124,22 +92,37 @@ RegistrationConfig grid_registration_config(std::size_t largest, double resoluti
   return config;
 }
 
-std::vector<GridHypothesis> register_grids(const OccupancyImage& a, const OccupancyImage& b, double resolution_m) {
+PaddedPair pad(const OccupancyImage& a, const OccupancyImage& b, double resolution_m) {
   if (!(resolution_m > 0.0) || !std::isfinite(resolution_m)) {
     throw std::invalid_argument("the resolution is a positive number of metres");
   }
-  const RegistrationConfig config =
-      grid_registration_config(std::max({a.width, a.height, b.width, b.height}), resolution_m);
-  const Padded padded_a = pad(a, config.grid_side, resolution_m);
-  const Padded padded_b = pad(b, config.grid_side, resolution_m);
-  Registration registration(config);
+  PaddedPair pair;
+  pair.config = grid_registration_config(std::max({a.width, a.height, b.width, b.height}), resolution_m);
+  pair.a = pad(a, pair.config.grid_side, resolution_m);
+  pair.b = pad(b, pair.config.grid_side, resolution_m);
+  return pair;
+}
+
+std::vector<GridHypothesis> register_grids(const PaddedPair& pair) {
+  HeapArena memory;
+  SpectralRegistration registration;
+  require(registration.init(pair.config,
+                            memory.carve([&](auto& arena) { return SpectralRegistration::carve(arena, pair.config); })),
+          "registration");
+  require(registration.set_query(pair.b.view()), "grid B");
+  require(registration.begin(pair.a.view()), "grid A");
+  while (!registration.step()) {
+  }
   std::vector<GridHypothesis> hypotheses;
-  for (const PlaceHypothesis& place : registration.run(padded_a.view(), padded_b.view())) {
-    const Pose2 a_T_b = compose(compose(inverse(padded_a.centre_T_corner), place.a_T_b), padded_b.centre_T_corner);
-    hypotheses.push_back({a_T_b, static_cast<double>(place.confidence), static_cast<double>(place.peak),
-                          static_cast<double>(place.agreement)});
+  for (const PlaceHypothesis& place : registration.hypotheses()) {
+    hypotheses.push_back({pair.between_corners(place.a_T_b), static_cast<double>(place.confidence),
+                          static_cast<double>(place.peak), static_cast<double>(place.agreement)});
   }
   return hypotheses;
+}
+
+std::vector<GridHypothesis> register_grids(const OccupancyImage& a, const OccupancyImage& b, double resolution_m) {
+  return register_grids(pad(a, b, resolution_m));
 }
 
 }  // namespace mellin::host

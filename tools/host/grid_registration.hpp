@@ -26,8 +26,32 @@ inline constexpr double kAcceptedConfidence = 0.5;
 /// hypotheses aligned as can be. Throws std::invalid_argument where the grids are too large.
 RegistrationConfig grid_registration_config(std::size_t largest, double resolution_m);
 
+/// A grid in the middle of a square one, whose frame has its origin in the centre as a submap's has.
+struct PaddedGrid {
+  std::vector<std::uint8_t> cells;
+  std::uint16_t side = 0;
+  float cell_m = 0.0F;
+  Pose2 centre_T_corner;  ///< from the picture's frame to the square grid's
+  GridView view() const { return {{cells.data(), cells.size()}, side, cell_m}; }
+};
+
+/// Two grids as they are registered.
+struct PaddedPair {
+  RegistrationConfig config;
+  PaddedGrid a;
+  PaddedGrid b;
+  /// A pose between the square grids' frames as one between the pictures'.
+  Pose2 between_corners(const Pose2& a_T_b) const {
+    return compose(compose(inverse(a.centre_T_corner), a_T_b), b.centre_T_corner);
+  }
+};
+
+/// Throws as register_grids() does.
+PaddedPair pad(const OccupancyImage& a, const OccupancyImage& b, double resolution_m);
+
 /// All distinct hypotheses, best confidence first; empty where a grid shows nothing. `resolution_m` is the edge of a
 /// cell in both. Throws std::invalid_argument where it is not a positive number, or the grids are too large.
 std::vector<GridHypothesis> register_grids(const OccupancyImage& a, const OccupancyImage& b, double resolution_m);
+std::vector<GridHypothesis> register_grids(const PaddedPair& pair);
 
 }  // namespace mellin::host
