@@ -259,15 +259,35 @@ void MapCollection::finish_screening() {
     event.score = found[0].peak;
     event.agreement = found[0].agreement;
     event.a_T_b = found[0].a_T_b;
-    event.accepted = found[0].agreement >= config_.candidate_agreement;
   }
-  event.reason = event.accepted ? LinkReason::none : LinkReason::weak;
+  event.reason = screening_verdict();
+  event.accepted = event.reason == LinkReason::none;
   report(event);
   if (event.accepted) {
     (void)candidates_.push({other_, event.agreement});
   }
   ++other_;
   stage_ = Stage::screen;
+}
+
+/// Of the comparison that has ended, counted: none, or why the pair is no candidate.
+LinkReason MapCollection::screening_verdict() {
+  switch (digests_->compare_end()) {
+    case CompareEnd::coarse:
+      ++statistics_.pairs_dropped_coarse;
+      return LinkReason::coarse_mismatch;
+    case CompareEnd::rotation:
+      ++statistics_.pairs_dropped_rotation;
+      return LinkReason::no_rotation;
+    case CompareEnd::first_peaks:
+      ++statistics_.pairs_cut_short;
+      break;
+    case CompareEnd::compared:
+      break;
+  }
+  const PlaceHypotheses& found = digests_->hypotheses();
+  const bool alike = !found.empty() && found[0].agreement >= config_.candidate_agreement;
+  return alike ? LinkReason::none : LinkReason::weak;
 }
 
 /// Index into the candidates; their number where there is none.

@@ -33,6 +33,9 @@ struct EdgeCounts {
 struct PairCounts {
   std::uint64_t possible = 0;
   std::uint64_t screened = 0;
+  std::uint64_t dropped_coarse = 0;    ///< of the screened ones
+  std::uint64_t dropped_rotation = 0;  ///< likewise
+  std::uint64_t cut_short = 0;         ///< likewise
   std::uint64_t registered = 0;
   std::uint64_t accepted = 0;
 };

@@ -63,6 +63,9 @@ struct PairObserver {
 struct CollectionStatistics {
   std::uint64_t pairs_possible = 0;  ///< pairs of submaps that share no scans
   std::uint64_t pairs_screened = 0;
+  std::uint64_t pairs_dropped_coarse = 0;    ///< of the screened ones: coarser digests do not match
+  std::uint64_t pairs_dropped_rotation = 0;  ///< likewise: no rotation stands out
+  std::uint64_t pairs_cut_short = 0;         ///< likewise: the first rotation peaks left no hope for the others
   std::uint64_t pairs_registered = 0;
   std::uint64_t pairs_accepted = 0;  ///< became edges
   std::uint32_t edges_rejected = 0;  ///< were edges, and then outliers
@@ -214,6 +217,7 @@ class MapCollection {
   void recall_digest();
   void begin_comparison();
   void finish_screening();
+  LinkReason screening_verdict();
   std::size_t best_by_digest() const;
   std::size_t nearest_in_graph() const;
   void choose_candidate();
