@@ -117,7 +117,7 @@ Status SpectralScreening::begin_restore(std::uint32_t index, Span<const std::uin
   return Status::ok;
 }
 
-Status SpectralScreening::begin_compare(std::uint32_t a, std::uint32_t b) {
+Status SpectralScreening::begin_compare(std::uint32_t a, std::uint32_t b, bool thorough) {
   hypotheses_.clear();
   stage_ = Stage::idle;
   if (!holds(a) || !holds(b)) {
@@ -125,10 +125,11 @@ Status SpectralScreening::begin_compare(std::uint32_t a, std::uint32_t b) {
   }
   a_ = a;
   b_ = b;
+  thorough_ = thorough;
   end_ = CompareEnd::compared;
   classified_a_ = kNone;
   // Where a coarse digest has lost all structure, the full one decides.
-  if (coarse_.enabled() && coarse_.begin_compare(a, b) == Status::ok) {
+  if (coarse_.enabled() && !thorough && coarse_.begin_compare(a, b) == Status::ok) {
     stage_ = Stage::compare_coarse;
   } else {
     begin_full_comparison();
@@ -154,7 +155,7 @@ void SpectralScreening::begin_match() {
     matcher_.keep_turned(fb);
     kept_b_ = b_;
   }
-  const MatchOptions options = {config_.first_peaks, config_.min_rotation_peak};
+  const MatchOptions options = {config_.first_peaks, thorough_ ? 0.0F : config_.min_rotation_peak};
   stage_ = matcher_.begin_match(fa, fb, options) == Status::ok ? Stage::match : Stage::idle;
 }
 
@@ -224,7 +225,8 @@ void SpectralScreening::finish_coarse() {
 void SpectralScreening::finish_match() {
   verify_next_ = 0;
   if (matcher_.hypotheses().empty()) {
-    end_ = hypotheses_.empty() && config_.min_rotation_peak > 0.0F ? CompareEnd::rotation : end_;
+    const bool dropped = hypotheses_.empty() && config_.min_rotation_peak > 0.0F && !thorough_;
+    end_ = dropped ? CompareEnd::rotation : end_;
     stage_ = Stage::idle;
     return;
   }
@@ -260,7 +262,7 @@ void SpectralScreening::finish_verification() {
   if (matcher_.untried_rotations() == 0) {
     return;
   }
-  if (hypotheses_[0].agreement < config_.further_agreement) {
+  if (!thorough_ && hypotheses_[0].agreement < config_.further_agreement) {
     end_ = CompareEnd::first_peaks;
   } else if (matcher_.begin_further()) {
     stage_ = Stage::match;

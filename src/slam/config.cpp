@@ -155,7 +155,8 @@ Status validate_cascade(const ScreeningConfig& s, const Log& log) {
       {"verified", static_cast<float>(s.verified), 1.0F, 255.0F, true, "at least 1"},
       {"verified_share", s.verified_share, 0.0F, 1.0F, true, "0 to 1"},
   };
-  if (s.coarse_peaks > 0 && (!s.cache_features || s.matcher.side % 2 != 0 || !is_fft_side(coarse_config(s).matcher.side))) {
+  if (s.coarse_peaks > 0 &&
+      (!s.cache_features || s.matcher.side % 2 != 0 || !is_fft_side(coarse_config(s).matcher.side))) {
     return refuse(log, "coarse_peaks", s.coarse_peaks,
                   "0 where features are not cached, or half of screening_side is no transform's side");
   }

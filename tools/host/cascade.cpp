@@ -2,6 +2,7 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <set>
 #include <stdexcept>
 
@@ -28,6 +29,17 @@ std::set<std::pair<SubmapId, SubmapId>> linked_pairs(const MapCollection& map) {
     const Edge& edge = map.graph().edge(id);
     if (edge.enabled && edge.kind != EdgeKind::odometry) {
       pairs.emplace(std::min(edge.a, edge.b), std::max(edge.a, edge.b));
+    }
+  }
+  return pairs;
+}
+
+/// Pairs that the graph had in one place when they were screened.
+std::set<std::pair<SubmapId, SubmapId>> nearby_pairs(const MappingRun& run) {
+  std::set<std::pair<SubmapId, SubmapId>> pairs;
+  for (const MatchRow& row : run.matches()) {
+    if (row.nearby) {
+      pairs.emplace(row.a, row.b);
     }
   }
   return pairs;
@@ -87,6 +99,7 @@ CascadeCounts screen_all(MappingRun& run, const Config& config) {
     throw std::runtime_error(std::string("the library refuses the screening: ") + to_string(status));
   }
   const std::set<std::pair<SubmapId, SubmapId>> linked = linked_pairs(map);
+  const std::set<std::pair<SubmapId, SubmapId>> nearby = nearby_pairs(run);
   CascadeCounts counts;
   double seconds = 0.0;
   for (SubmapId b = 0; b < map.size(); ++b) {
@@ -98,8 +111,10 @@ CascadeCounts screen_all(MappingRun& run, const Config& config) {
       const bool edge = linked.count({a, b}) != 0;
       ++counts.pairs;
       counts.edges += edge ? 1U : 0U;
+      const bool thorough = nearby.count({a, b}) != 0;
+      counts.nearby += thorough ? 1U : 0U;
       const double start = seconds_now();
-      const bool begun = screening.begin_compare(a, b) == Status::ok;
+      const bool begun = screening.begin_compare(a, b, thorough) == Status::ok;
       finish(screening);
       seconds += seconds_now() - start;
       if (begun) {

@@ -1,5 +1,5 @@
-// What each stage of the screening cascade drops and keeps, on the submaps of a whole drive: the pairs that became edges
-// of the map without the cascade are those that it must not lose.
+// What each stage of the screening cascade drops and keeps, on the submaps of a whole drive: the pairs that became
+// edges of the map without the cascade are those that it must not lose.
 #pragma once
 
 #include <cstdint>
@@ -18,6 +18,7 @@ struct CascadeCounts {
   std::uint64_t dropped_coarse = 0;
   std::uint64_t dropped_rotation = 0;
   std::uint64_t cut_short = 0;
+  std::uint64_t nearby = 0;  ///< by the graph as it was when they were screened: no stage drops them
   std::uint64_t candidates = 0;
   std::uint64_t edges = 0;       ///< pairs that are joined by a loop or merge edge …
   std::uint64_t edges_kept = 0;  ///< … and still are candidates

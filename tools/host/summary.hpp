@@ -100,7 +100,8 @@ struct MatchRow {
   double agreement = 0.0;
   Pose2 a_T_b;
   bool accepted = false;
-  std::string why;  ///< why it was accepted or not
+  std::string why;      ///< why it was accepted or not
+  bool nearby = false;  ///< screened: the graph has both in one place; not in the file
 };
 
 std::string submaps_csv(const std::vector<SubmapRow>& rows);

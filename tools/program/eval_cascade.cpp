@@ -65,15 +65,16 @@ void add_log(const CascadeCommand& command, const std::string& path, host::Table
   const std::vector<std::string>& variants = command.variants.empty() ? kVariants : command.variants;
   for (const std::string& variant : variants) {
     const host::CascadeCounts c = host::screen_all(run, with_settings(config, variant));
-    table.add({name.substr(0, name.find('.')), variant, std::to_string(c.pairs), per_cent(c.dropped_coarse, c.pairs),
-               per_cent(c.dropped_rotation, c.pairs), per_cent(c.cut_short, c.pairs), per_cent(c.candidates, c.pairs),
-               std::to_string(c.edges), per_cent(c.edges_kept, c.edges), host::fixed(c.us_a_pair, 1)});
+    table.add({name.substr(0, name.find('.')), variant, std::to_string(c.pairs), per_cent(c.nearby, c.pairs),
+               per_cent(c.dropped_coarse, c.pairs), per_cent(c.dropped_rotation, c.pairs),
+               per_cent(c.cut_short, c.pairs), per_cent(c.candidates, c.pairs), std::to_string(c.edges),
+               per_cent(c.edges_kept, c.edges), host::fixed(c.us_a_pair, 1)});
   }
 }
 
 void run(const CascadeCommand& command) {
-  host::Table table({"log", "screening", "pairs", "coarse_%", "rotation_%", "cut_short_%", "candidates_%", "edges",
-                     "edges_kept_%", "us_a_pair"});
+  host::Table table({"log", "screening", "pairs", "nearby_%", "coarse_%", "rotation_%", "cut_short_%", "candidates_%",
+                     "edges", "edges_kept_%", "us_a_pair"});
   for (const std::string& path : command.logs) {
     add_log(command, path, table);
   }
@@ -83,7 +84,8 @@ void run(const CascadeCommand& command) {
   }
   std::printf(
       "Each log is mapped without the cascade; then all its pairs of submaps that share no scans are screened in each\n"
-      "way. coarse, rotation: dropped by that stage; cut_short: further rotation peaks not tried; edges: pairs that\n"
+      "way. nearby: by the graph, never dropped; coarse, rotation: dropped by that stage; cut_short: further rotation "
+      "peaks not tried; edges: pairs that\n"
       "became loop edges of the map; kept: of these still candidates for registration; us: processor time.\n\n%s",
       table.text().c_str());
 }

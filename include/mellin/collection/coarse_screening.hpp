@@ -53,8 +53,8 @@ class CoarseScreening {
   Status init(const CoarseScreeningConfig& config, const Memory& memory);
   bool enabled() const { return config_.slots > 0; }
 
-  /// Starts to describe a digest with both masks, which may go when this returns. One pass over it; scratch memory until
-  /// it returns. invalid_argument: sizes do not hold, slot out of range.
+  /// Starts to describe a digest with both masks, which may go when this returns. One pass over it; scratch memory
+  /// until it returns. invalid_argument: sizes do not hold, slot out of range.
   Status begin_describe(std::uint32_t slot, const DigestView& digest, Span<float> scratch);
   /// Starts to compare two described ones. degenerate: one has nothing to compare, step() is true at once.
   Status begin_compare(std::uint32_t a, std::uint32_t b);

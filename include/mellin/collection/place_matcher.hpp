@@ -44,8 +44,9 @@ class DigestMatcher {
   virtual Status begin_describe(std::uint32_t index, const GridView& grid) = 0;
   /// Starts to restore a description from the bytes that digest_bytes() gave.
   virtual Status begin_restore(std::uint32_t index, Span<const std::uint8_t> digest) = 0;
-  /// Starts to compare two described submaps. invalid_argument; degenerate where one has nothing to compare.
-  virtual Status begin_compare(std::uint32_t a, std::uint32_t b) = 0;
+  /// Starts to compare two described submaps; `thorough`: the pair is likely, no early stage may drop it.
+  /// invalid_argument; degenerate where one has nothing to compare.
+  virtual Status begin_compare(std::uint32_t a, std::uint32_t b, bool thorough) = 0;
   /// One slice. True when the job is done.
   virtual bool step() = 0;
   virtual const PlaceHypotheses& hypotheses() const = 0;
