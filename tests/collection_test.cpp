@@ -60,7 +60,7 @@ class FakeDigests final : public DigestMatcher {
     ++restored;
     return start();
   }
-  Status begin_compare(std::uint32_t a, std::uint32_t b) override {
+  Status begin_compare(std::uint32_t a, std::uint32_t b, bool /*thorough*/) override {
     compared.emplace_back(a, b);
     for (const std::uint32_t index : {a, b}) {
       for (std::size_t i = 0; i < 4; ++i) {

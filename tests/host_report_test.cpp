@@ -22,7 +22,7 @@ Summary example() {
   s.sessions = {{"a.log", "0000", 11, 12, 0, 15}, {"b.log", "1111", 13, 14, 1, 0}};
   s.components = 2;
   s.edges = {21, 22, 23, 24};
-  s.pairs = {31, 32, 33, 34};
+  s.pairs = {31, 32, 35, 36, 37, 33, 34};
   s.seconds = {21.5, 2.5, 3.5, 4.5, 5.5, 0.5};
   s.memory = {51, 52, 0, 54};
   s.store = {61, 62, 63, 64, 65};
@@ -57,7 +57,8 @@ TEST_CASE("summary.json has the fields that the contract names") {
                  {"log": "b.log", "id": "1111", "scans": 13, "submaps": 14, "component": 1, "lost": 0}],
     "components": 2,
     "edges": {"odometry": 21, "loop": 22, "merge": 23, "rejected": 24},
-    "pairs": {"possible": 31, "screened": 32, "registered": 33, "accepted": 34},
+    "pairs": {"possible": 31, "screened": 32, "dropped_coarse": 35, "dropped_rotation": 36, "cut_short": 37,
+              "registered": 33, "accepted": 34},
     "seconds": {"total": 21.5, "local_mapping": 2.5, "screening": 3.5, "registration": 4.5, "optimisation": 5.5,
                 "store": 0.5},
     "memory": {"arena_bytes": 51, "arena_used_bytes": 52, "heap_allocations_after_init": 0, "peak_rss_bytes": 54},

@@ -140,6 +140,20 @@ TEST_CASE("validate() refuses each field out of its range and names it") {
       {"rotation", [](Config& c) { c.registration.matcher.rotation = static_cast<RotationMode>(4); }},
       {"high_pass", [](Config& c) { c.screening.matcher.high_pass = static_cast<HighPass>(3); }},
       {"peak_fit", [](Config& c) { c.registration.matcher.peak_fit = static_cast<PeakFit>(2); }},
+      {"coarse_peaks", [](Config& c) { c.screening.coarse_peaks = 7; }},
+      {"coarse_peaks", [](Config& c) { c.screening.coarse_peaks = 1; }},  // features are not cached
+      {"coarse_peaks",
+       [](Config& c) {
+         c.screening.cache_features = true;
+         c.screening.coarse_peaks = 1;  // 20 pixels are too few
+       }},
+      {"coarse_peak", [](Config& c) { c.screening.coarse_peak = kNaN; }},
+      {"coarse_agreement", [](Config& c) { c.screening.coarse_agreement = -0.1F; }},
+      {"min_rotation_peak", [](Config& c) { c.screening.min_rotation_peak = 1.5F; }},
+      {"first_peaks", [](Config& c) { c.screening.first_peaks = 0; }},
+      {"further_agreement", [](Config& c) { c.screening.further_agreement = kNaN; }},
+      {"verified", [](Config& c) { c.screening.verified = 0; }},
+      {"verified_share", [](Config& c) { c.screening.verified_share = 2.0F; }},
       {"class_side", [](Config& c) { c.class_side = 100; }},
       {"class_side", [](Config& c) { c.class_side = 0; }},
       {"grid_slots", [](Config& c) { c.grid_slots = 1; }},

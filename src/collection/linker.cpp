@@ -22,6 +22,10 @@ const char* to_string(LinkReason reason) {
       return "dropped for lack of room";
     case LinkReason::redundant:
       return "the graph knows as much without it";
+    case LinkReason::coarse_mismatch:
+      return "coarse digests do not match";
+    case LinkReason::no_rotation:
+      return "no rotation stands out";
   }
   return "unknown";
 }

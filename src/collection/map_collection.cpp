@@ -1,5 +1,7 @@
 #include "mellin/collection/map_collection.hpp"
 
+#include <cmath>
+
 #include "mellin/collection/persistence.hpp"
 
 namespace mellin {
@@ -239,7 +241,8 @@ void MapCollection::recall_digest() {
 }
 
 void MapCollection::begin_comparison() {
-  if (digests_->begin_compare(other_, count_ - 1) == Status::ok) {
+  nearby_ = distance_in_graph(other_) < static_cast<double>(config_.nearby_m);
+  if (digests_->begin_compare(other_, count_ - 1, nearby_) == Status::ok) {
     stage_ = Stage::screening;
   } else {
     ++other_;
@@ -255,19 +258,48 @@ void MapCollection::finish_screening() {
   event.stage = PairEvent::Stage::screened;
   event.a = other_;
   event.b = newest;
+  event.nearby = nearby_;
   if (!found.empty()) {
     event.score = found[0].peak;
     event.agreement = found[0].agreement;
     event.a_T_b = found[0].a_T_b;
-    event.accepted = found[0].agreement >= config_.candidate_agreement;
   }
-  event.reason = event.accepted ? LinkReason::none : LinkReason::weak;
+  event.reason = screening_verdict();
+  event.accepted = event.reason == LinkReason::none;
   report(event);
   if (event.accepted) {
     (void)candidates_.push({other_, event.agreement});
   }
   ++other_;
   stage_ = Stage::screen;
+}
+
+/// Of the comparison that has ended, counted: none, or why the pair is no candidate.
+LinkReason MapCollection::screening_verdict() {
+  switch (digests_->compare_end()) {
+    case CompareEnd::coarse:
+      ++statistics_.pairs_dropped_coarse;
+      return LinkReason::coarse_mismatch;
+    case CompareEnd::rotation:
+      ++statistics_.pairs_dropped_rotation;
+      return LinkReason::no_rotation;
+    case CompareEnd::first_peaks:
+      ++statistics_.pairs_cut_short;
+      break;
+    case CompareEnd::compared:
+      break;
+  }
+  const PlaceHypotheses& found = digests_->hypotheses();
+  const bool alike = !found.empty() && found[0].agreement >= config_.candidate_agreement;
+  return alike ? LinkReason::none : LinkReason::weak;
+}
+
+/// Of the newest submap, m; beyond all where the graph does not join the two.
+double MapCollection::distance_in_graph(SubmapId other) const {
+  const SubmapId newest = count_ - 1;
+  return graph_.component(other) == graph_.component(newest)
+             ? translation(between(graph_.pose(other), graph_.pose(newest)))
+             : HUGE_VAL;
 }
 
 /// Index into the candidates; their number where there is none.
@@ -283,15 +315,10 @@ std::size_t MapCollection::best_by_digest() const {
 
 /// The same, of the candidate that lies nearest to the new submap by the graph; none beyond nearby_m.
 std::size_t MapCollection::nearest_in_graph() const {
-  const SubmapId newest = count_ - 1;
   std::size_t best = candidates_.size();
   auto least = static_cast<double>(config_.nearby_m);
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
-    const SubmapId id = candidates_[i].id;
-    if (graph_.component(id) != graph_.component(newest)) {
-      continue;
-    }
-    const double distance = translation(between(graph_.pose(id), graph_.pose(newest)));
+    const double distance = distance_in_graph(candidates_[i].id);
     if (distance < least) {
       least = distance;
       best = i;

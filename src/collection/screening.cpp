@@ -27,14 +27,18 @@ Status SpectralScreening::init(const ScreeningConfig& config, const Memory& memo
   while (side > config.matcher.side && side % 2 == 0) {
     side /= 2;
   }
-  if (side != config.matcher.side || config.max_submaps == 0 || (config.cache_features && !config.hold_digests)) {
+  if (side != config.matcher.side || config.max_submaps == 0 || (config.cache_features && !config.hold_digests) ||
+      (config.coarse_peaks > 0 && !config.cache_features) || config.first_peaks == 0) {
     return Status::invalid_config;
   }
   const std::size_t held = config.hold_digests ? config.max_submaps : 2;
   if (memory.scratch.size() < scratch_size(config) || memory.digests.size() < held * digest_size(config.matcher.side)) {
     return Status::insufficient_memory;
   }
-  return matcher_.init(config.matcher, memory.matcher);
+  cache_ = FeatureCache(config.matcher, memory.features);
+  verifier_ = DigestVerifier(config.verification, memory.verifier);
+  const Status coarse = coarse_.init(coarse_config(config), memory.coarse);
+  return coarse == Status::ok ? matcher_.init(config.matcher, memory.matcher) : coarse;
 }
 
 bool SpectralScreening::holds(std::uint32_t index) const {
@@ -62,29 +66,19 @@ Span<const std::uint8_t> SpectralScreening::digest_bytes(std::uint32_t index) co
   return {digest_out(index).obstacles.data(), digest_size(config_.matcher.side)};
 }
 
-Features SpectralScreening::cached_features(std::uint32_t index) const {
-  const std::size_t slot = index;
-  Features f;
-  f.image =
-      memory_.images.subspan(slot * Features::image_count(config_.matcher), Features::image_count(config_.matcher));
-  f.filter =
-      memory_.filters.subspan(slot * Features::filter_count(config_.matcher), Features::filter_count(config_.matcher));
-  const std::size_t polar = Features::polar_count(config_.matcher);
-  f.polar = memory_.polar.subspan(slot * polar, polar);
-  f.floor = memory_.floors[slot];
-  f.curvature = memory_.curvatures[slot];
-  f.ready = memory_.ready[slot] != 0;
-  return f;
-}
-
 void SpectralScreening::begin_features(std::uint32_t index, Features& out, Stage stage) {
   const DigestOut digest = digest_out(index);
   stage_ = matcher_.begin_extract(digest.obstacles, out, digest.observed) == Status::ok ? stage : Stage::idle;
 }
 
 void SpectralScreening::begin_caching(std::uint32_t index) {
-  features_a_ = cached_features(index);
+  features_a_ = cache_.at(index);
   begin_features(index, features_a_, Stage::features);
+}
+
+void SpectralScreening::begin_describing_coarse() {
+  const bool begun = coarse_.enabled() && coarse_.begin_describe(a_, digest_view(a_), memory_.scratch) == Status::ok;
+  stage_ = begun ? Stage::describe_coarse : Stage::idle;
 }
 
 Status SpectralScreening::begin_describe(std::uint32_t index, const GridView& grid) {
@@ -96,6 +90,7 @@ Status SpectralScreening::begin_describe(std::uint32_t index, const GridView& gr
   featured_b_ = kNone;
   kept_b_ = kNone;
   classified_b_ = kNone;
+  coarse_.forget_query();
   described_ = index;
   restored_ = kNone;
   const Status status = maker_.begin(grid, memory_.scratch, digest_out(index), config_.matcher.preprocessing);
@@ -122,7 +117,7 @@ Status SpectralScreening::begin_restore(std::uint32_t index, Span<const std::uin
   return Status::ok;
 }
 
-Status SpectralScreening::begin_compare(std::uint32_t a, std::uint32_t b) {
+Status SpectralScreening::begin_compare(std::uint32_t a, std::uint32_t b, bool thorough) {
   hypotheses_.clear();
   stage_ = Stage::idle;
   if (!holds(a) || !holds(b)) {
@@ -130,25 +125,38 @@ Status SpectralScreening::begin_compare(std::uint32_t a, std::uint32_t b) {
   }
   a_ = a;
   b_ = b;
-  if (config_.cache_features) {
-    begin_match();
-  } else if (featured_b_ == b) {
-    begin_features(a, features_a_, Stage::extract_a);
+  thorough_ = thorough;
+  end_ = CompareEnd::compared;
+  classified_a_ = kNone;
+  // Where a coarse digest has lost all structure, the full one decides.
+  if (coarse_.enabled() && !thorough && coarse_.begin_compare(a, b) == Status::ok) {
+    stage_ = Stage::compare_coarse;
   } else {
-    begin_features(b, features_b_, Stage::extract_b);
+    begin_full_comparison();
   }
   return stage_ == Stage::idle ? Status::degenerate : Status::ok;
 }
 
+void SpectralScreening::begin_full_comparison() {
+  if (config_.cache_features) {
+    begin_match();
+  } else if (featured_b_ == b_) {
+    begin_features(a_, features_a_, Stage::extract_a);
+  } else {
+    begin_features(b_, features_b_, Stage::extract_b);
+  }
+}
+
 void SpectralScreening::begin_match() {
   const bool cached = config_.cache_features;
-  const Features fa = cached ? cached_features(a_) : features_a_;
-  const Features fb = cached ? cached_features(b_) : features_b_;
+  const Features fa = cached ? cache_.at(a_) : features_a_;
+  const Features fb = cached ? cache_.at(b_) : features_b_;
   if (kept_b_ != b_) {
     matcher_.keep_turned(fb);
     kept_b_ = b_;
   }
-  stage_ = matcher_.begin_match(fa, fb) == Status::ok ? Stage::match : Stage::idle;
+  const MatchOptions options = {config_.first_peaks, thorough_ ? 0.0F : config_.min_rotation_peak};
+  stage_ = matcher_.begin_match(fa, fb, options) == Status::ok ? Stage::match : Stage::idle;
 }
 
 bool SpectralScreening::step() {
@@ -165,10 +173,18 @@ bool SpectralScreening::step() {
       break;
     case Stage::features:
       if (matcher_.step()) {
-        memory_.floors[a_] = features_a_.floor;
-        memory_.curvatures[a_] = features_a_.curvature;
-        memory_.ready[a_] = features_a_.ready ? 1 : 0;
+        cache_.keep(a_, features_a_);
+        begin_describing_coarse();
+      }
+      break;
+    case Stage::describe_coarse:
+      if (coarse_.step()) {
         stage_ = Stage::idle;
+      }
+      break;
+    case Stage::compare_coarse:
+      if (coarse_.step()) {
+        finish_coarse();
       }
       break;
     case Stage::extract_b:
@@ -184,13 +200,7 @@ bool SpectralScreening::step() {
       break;
     case Stage::match:
       if (matcher_.step()) {
-        class_a_ = classes(a_, memory_.classes_a, memory_.obstacles_a);
-        if (classified_b_ != b_) {
-          class_b_ = classes(b_, memory_.classes_b, memory_.obstacles_b);
-          classified_b_ = b_;
-        }
-        verify_next_ = 0;
-        stage_ = matcher_.hypotheses().empty() ? Stage::idle : Stage::verify;
+        finish_match();
       }
       break;
     case Stage::verify:
@@ -200,29 +210,62 @@ bool SpectralScreening::step() {
   return stage_ == Stage::idle;
 }
 
-ClassObstacles SpectralScreening::classes(std::uint32_t index, Span<std::uint8_t> out, Span<ClassCell> cells) {
-  const Result<ClassView> view = classify(digest_out(index).view(config_.matcher.pixel_m), config_.verification, out);
-  if (!view.ok()) {
-    return {};
+/// What the coarse digests' best hypothesis says is all that is known of a pair that is dropped.
+void SpectralScreening::finish_coarse() {
+  const PlaceHypothesis& best = coarse_.best();
+  if (best.peak < config_.coarse_peak || best.agreement < config_.coarse_agreement) {
+    end_ = CompareEnd::coarse;
+    hypotheses_.insert(0, best);
+    stage_ = Stage::idle;
+    return;
   }
-  const Result<Span<const ClassCell>> found = obstacles(view.value(), cells);
-  return {view.value(), found.ok() ? found.value() : Span<const ClassCell>()};
+  begin_full_comparison();
+}
+
+void SpectralScreening::finish_match() {
+  verify_next_ = 0;
+  if (matcher_.hypotheses().empty()) {
+    const bool dropped = hypotheses_.empty() && config_.min_rotation_peak > 0.0F && !thorough_;
+    end_ = dropped ? CompareEnd::rotation : end_;
+    stage_ = Stage::idle;
+    return;
+  }
+  if (classified_a_ != a_) {
+    verifier_.set_a(digest_view(a_));
+    classified_a_ = a_;
+  }
+  if (classified_b_ != b_) {
+    verifier_.set_b(digest_view(b_));
+    classified_b_ = b_;
+  }
+  stage_ = Stage::verify;
 }
 
 void SpectralScreening::verify_one() {
   const HypothesisList& found = matcher_.hypotheses();
   const Hypothesis& h = found[verify_next_];
-  const Result<Agreement> agreement = verify_obstacles(class_a_, class_b_, h.a_T_b, config_.verification);
   PlaceHypothesis out;
   out.a_T_b = h.a_T_b;
   out.peak = h.peak;
-  if (agreement.ok()) {
-    out.agreement = agreement.value().score;
-  }
+  out.agreement = verifier_.agreement(h.a_T_b);
   insert_by_agreement(hypotheses_, out);
   ++verify_next_;
-  if (verify_next_ >= found.size() || verify_next_ >= config_.verified) {
-    stage_ = Stage::idle;
+  if (verify_next_ >= found.size() || verify_next_ >= config_.verified ||
+      found[verify_next_].peak < config_.verified_share * found[0].peak) {
+    finish_verification();
+  }
+}
+
+/// Further rotations only where the first ones leave hope.
+void SpectralScreening::finish_verification() {
+  stage_ = Stage::idle;
+  if (matcher_.untried_rotations() == 0) {
+    return;
+  }
+  if (!thorough_ && hypotheses_[0].agreement < config_.further_agreement) {
+    end_ = CompareEnd::first_peaks;
+  } else if (matcher_.begin_further()) {
+    stage_ = Stage::match;
   }
 }
 

@@ -144,6 +144,25 @@ Status validate_matcher(const MatcherConfig& m, const Log& log) {
   return validate_all(fields, log);
 }
 
+Status validate_cascade(const ScreeningConfig& s, const Log& log) {
+  const Limits fields[] = {
+      {"coarse_peaks", static_cast<float>(s.coarse_peaks), 0.0F, 6.0F, true, "0 to 6"},
+      {"coarse_peak", s.coarse_peak, 0.0F, 1.0F, true, "0 to 1"},
+      {"coarse_agreement", s.coarse_agreement, 0.0F, 1.0F, true, "0 to 1"},
+      {"min_rotation_peak", s.min_rotation_peak, 0.0F, 1.0F, true, "0 to 1"},
+      {"first_peaks", static_cast<float>(s.first_peaks), 1.0F, 6.0F, true, "1 to 6"},
+      {"further_agreement", s.further_agreement, 0.0F, 1.0F, true, "0 to 1"},
+      {"verified", static_cast<float>(s.verified), 1.0F, 255.0F, true, "at least 1"},
+      {"verified_share", s.verified_share, 0.0F, 1.0F, true, "0 to 1"},
+  };
+  if (s.coarse_peaks > 0 &&
+      (!s.cache_features || s.matcher.side % 2 != 0 || !is_fft_side(coarse_config(s).matcher.side))) {
+    return refuse(log, "coarse_peaks", s.coarse_peaks,
+                  "0 where features are not cached, or half of screening_side is no transform's side");
+  }
+  return validate_all(fields, log);
+}
+
 /// Arrays whose lengths are products: within 2^31 elements, so that a 32-bit processor measures them right.
 Status validate_products(const Config& c, const Log& log) {
   constexpr std::uint64_t kMost = std::uint64_t{1} << 31U;
@@ -235,6 +254,10 @@ Status validate(const Config& given, Log log) {
     if (status != Status::ok) {
       return status;
     }
+  }
+  const Status cascade = validate_cascade(c.screening, log);
+  if (cascade != Status::ok) {
+    return cascade;
   }
   if (c.class_side < 16 || c.side % c.class_side != 0) {
     return refuse(log, "class_side", c.class_side, "a divisor of side, at least 16");

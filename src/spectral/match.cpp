@@ -25,6 +25,21 @@ std::size_t Matcher::rotation_count() const {
   return std::min(rotation_.peaks().size(), most);
 }
 
+std::size_t Matcher::untried_rotations() const {
+  return std::min<std::size_t>(rotation_.peaks().size(), config_.max_peaks) - rotation_index_;
+}
+
+bool Matcher::begin_further() {
+  if (untried_rotations() == 0) {
+    return false;
+  }
+  options_.max_peaks = 0;
+  hypotheses_.clear();
+  stage_ = begin_rotation();
+  line_ = 0;
+  return true;
+}
+
 /// Multiple of the angular step nearest to the rotation under way; cyclic, since both it and the half turn beyond are
 /// looked at.
 std::uint32_t Matcher::turn_index() const {

@@ -106,6 +106,7 @@ Status Matcher::begin_match(const Features& a, const Features& b, const MatchOpt
   a_ = a;
   b_ = b;
   options_ = options;
+  rotation_index_ = 0;
   rotation_.begin_estimate(a.polar, b.polar, options.min_rotation_peak);
   status_ = Status::ok;
   stage_ = Stage::estimate_rotation;

@@ -85,7 +85,8 @@ Summary summarise(const MappingRun& run, const std::vector<std::vector<SubmapId>
   }
   const CollectionStatistics& c = map.statistics();
   s.edges.rejected = c.edges_rejected;
-  s.pairs = {c.pairs_possible, c.pairs_screened, c.pairs_registered, c.pairs_accepted};
+  s.pairs = {c.pairs_possible,  c.pairs_screened,   c.pairs_dropped_coarse, c.pairs_dropped_rotation,
+             c.pairs_cut_short, c.pairs_registered, c.pairs_accepted};
   const auto seconds = [](std::uint64_t us) { return static_cast<double>(us) * 1e-6; };
   s.seconds.total = figures.total_seconds;
   s.seconds.local_mapping = seconds(slam.statistics().mapping_us + slam.statistics().rendering_us);

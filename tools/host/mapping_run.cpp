@@ -120,6 +120,7 @@ void MappingRun::take_events() {
     row.a_T_b = event.a_T_b;
     row.accepted = event.accepted;
     row.why = to_string(event.reason);
+    row.nearby = event.nearby;
     matches_.push_back(row);
   }
   pairs_.clear();

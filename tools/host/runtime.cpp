@@ -96,6 +96,7 @@ class Screening {
     config.grid_side = kGridSide;
     config.max_submaps = static_cast<std::uint32_t>(submaps.size());
     config.matcher = matcher_config(side, peaks);
+    config.min_rotation_peak = 0.0F;
     config.matcher.turns_per_bin = desktop_profile().screening.matcher.turns_per_bin;
     config.matcher.kept_turns = static_cast<std::uint16_t>(config.matcher.turns_per_bin * side);
     const SpectralScreening::Memory memory =

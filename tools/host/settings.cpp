@@ -102,7 +102,14 @@ void visit_settings(C& c, Visit&& visit) {
   visit("submaps.min_scans", c.submaps.min_scans);
   visit("submaps.band_rows", c.submaps.band_rows);
   visit_matcher("screening.", c.screening.matcher, visit);
+  visit("screening.coarse_peaks", c.screening.coarse_peaks);
+  visit("screening.coarse_peak", c.screening.coarse_peak);
+  visit("screening.coarse_agreement", c.screening.coarse_agreement);
+  visit("screening.min_rotation_peak", c.screening.min_rotation_peak);
+  visit("screening.first_peaks", c.screening.first_peaks);
+  visit("screening.further_agreement", c.screening.further_agreement);
   visit("screening.verified", c.screening.verified);
+  visit("screening.verified_share", c.screening.verified_share);
   visit("screening.cache_features", c.screening.cache_features);
   visit("screening.hold_digests", c.screening.hold_digests);
   visit_matcher("registration.", c.registration.matcher, visit);

@@ -65,6 +65,9 @@ std::string to_json(const Summary& s) {
       {"odometry", s.edges.odometry}, {"loop", s.edges.loop}, {"merge", s.edges.merge}, {"rejected", s.edges.rejected}};
   json["pairs"] = {{"possible", s.pairs.possible},
                    {"screened", s.pairs.screened},
+                   {"dropped_coarse", s.pairs.dropped_coarse},
+                   {"dropped_rotation", s.pairs.dropped_rotation},
+                   {"cut_short", s.pairs.cut_short},
                    {"registered", s.pairs.registered},
                    {"accepted", s.pairs.accepted}};
   json["seconds"] = seconds_json(s.seconds);

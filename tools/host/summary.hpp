@@ -33,6 +33,9 @@ struct EdgeCounts {
 struct PairCounts {
   std::uint64_t possible = 0;
   std::uint64_t screened = 0;
+  std::uint64_t dropped_coarse = 0;    ///< of the screened ones
+  std::uint64_t dropped_rotation = 0;  ///< likewise
+  std::uint64_t cut_short = 0;         ///< likewise
   std::uint64_t registered = 0;
   std::uint64_t accepted = 0;
 };
@@ -97,7 +100,8 @@ struct MatchRow {
   double agreement = 0.0;
   Pose2 a_T_b;
   bool accepted = false;
-  std::string why;  ///< why it was accepted or not
+  std::string why;      ///< why it was accepted or not
+  bool nearby = false;  ///< screened: the graph has both in one place; not in the file
 };
 
 std::string submaps_csv(const std::vector<SubmapRow>& rows);

@@ -17,6 +17,7 @@ void add_sim(CLI::App& app);       ///< mellin sim
 void add_store(CLI::App& app);     ///< mellin store
 
 /// Kinds of `mellin eval`, added to that command.
+void add_eval_cascade(CLI::App& eval);
 void add_eval_change(CLI::App& eval);
 void add_eval_confidence(CLI::App& eval);
 void add_eval_registration(CLI::App& eval);

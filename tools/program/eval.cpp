@@ -6,6 +6,7 @@ namespace mellin::program {
 void add_eval(CLI::App& app) {
   CLI::App* eval = app.add_subcommand("eval", "The paper's evaluation: curves, tables and pictures");
   eval->require_subcommand(1);
+  add_eval_cascade(*eval);
   add_eval_change(*eval);
   add_eval_confidence(*eval);
   add_eval_registration(*eval);

@@ -59,6 +59,8 @@ enum class LinkReason : std::uint8_t {
   outlier,           ///< was accepted, and later rejected by the robust optimisation
   forgotten,         ///< dropped while waiting, for lack of room
   redundant,         ///< the graph knows as much without it
+  coarse_mismatch,   ///< dropped by screening: already coarser digests do not match
+  no_rotation,       ///< dropped by screening: no rotation stands out
 };
 const char* to_string(LinkReason reason);
 

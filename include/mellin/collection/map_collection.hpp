@@ -33,7 +33,9 @@ struct CollectionConfig {
   /// Of those, so many are taken for where the graph has them, nearest first, and not for their digests: along a
   /// corridor all digests are alike.
   std::uint8_t nearby_candidates = 1;
-  float nearby_m = 10.0F;             ///< between the centres of submaps that the graph may have in one place
+  /// Between the centres of submaps that the graph may have in one place. No early stage of screening drops such a
+  /// pair.
+  float nearby_m = 10.0F;
   float candidate_agreement = 0.25F;  ///< digests must agree so well for a pair to be registered
   std::uint32_t digest_bytes = 0;     ///< of one digest, for the store
   bool close_loops = true;            ///< off: submaps are stored and linked by odometry only
@@ -49,7 +51,8 @@ struct PairEvent {
   SubmapId a = kNoSubmap;
   SubmapId b = kNoSubmap;
   bool between_sessions = false;
-  float score = 0.0F;  ///< peak of the matched filter
+  bool nearby = false;  ///< screened: the graph has them within nearby_m of each other
+  float score = 0.0F;   ///< peak of the matched filter
   float agreement = 0.0F;
   Pose2 a_T_b;
   bool accepted = false;  ///< screened: becomes a candidate; registered: becomes a hypothesis; decided: becomes an edge
@@ -63,6 +66,9 @@ struct PairObserver {
 struct CollectionStatistics {
   std::uint64_t pairs_possible = 0;  ///< pairs of submaps that share no scans
   std::uint64_t pairs_screened = 0;
+  std::uint64_t pairs_dropped_coarse = 0;    ///< of the screened ones: coarser digests do not match
+  std::uint64_t pairs_dropped_rotation = 0;  ///< likewise: no rotation stands out
+  std::uint64_t pairs_cut_short = 0;         ///< likewise: the first rotation peaks left no hope for the others
   std::uint64_t pairs_registered = 0;
   std::uint64_t pairs_accepted = 0;  ///< became edges
   std::uint32_t edges_rejected = 0;  ///< were edges, and then outliers
@@ -214,6 +220,8 @@ class MapCollection {
   void recall_digest();
   void begin_comparison();
   void finish_screening();
+  LinkReason screening_verdict();
+  double distance_in_graph(SubmapId other) const;
   std::size_t best_by_digest() const;
   std::size_t nearest_in_graph() const;
   void choose_candidate();
@@ -269,6 +277,7 @@ class MapCollection {
   SubmapId other_ = 0;           ///< next to be screened, or being registered
   List<Candidate> candidates_;
   std::uint8_t registered_ = 0;
+  bool nearby_ = false;              ///< other_ lies so by the graph, while it is screened
   bool evidence_ = false;            ///< a hypothesis came in since the last judgement
   std::uint32_t record_ = 0;         ///< next to be flushed or restored
   std::uint32_t loops_flushed_ = 0;  ///< loop and merge edges among those that this flush has put

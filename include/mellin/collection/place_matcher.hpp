@@ -28,6 +28,14 @@ inline constexpr std::size_t kMaxPlaceHypotheses = 6;
 /// Best first: by agreement, after registration by confidence.
 using PlaceHypotheses = FixedList<PlaceHypothesis, kMaxPlaceHypotheses>;
 
+/// How far a comparison of two digests came.
+enum class CompareEnd : std::uint8_t {
+  compared,     ///< through all stages
+  coarse,       ///< dropped: already coarser digests do not match
+  rotation,     ///< dropped: no rotation stands out
+  first_peaks,  ///< not all rotations were tried, since the first ones left no hope
+};
+
 /// Keeps a digest of each submap under an index and compares two of them. One job at a time, in bounded slices.
 class DigestMatcher {
  public:
@@ -36,11 +44,14 @@ class DigestMatcher {
   virtual Status begin_describe(std::uint32_t index, const GridView& grid) = 0;
   /// Starts to restore a description from the bytes that digest_bytes() gave.
   virtual Status begin_restore(std::uint32_t index, Span<const std::uint8_t> digest) = 0;
-  /// Starts to compare two described submaps. invalid_argument; degenerate where one has nothing to compare.
-  virtual Status begin_compare(std::uint32_t a, std::uint32_t b) = 0;
+  /// Starts to compare two described submaps; `thorough`: the pair is likely, no early stage may drop it.
+  /// invalid_argument; degenerate where one has nothing to compare.
+  virtual Status begin_compare(std::uint32_t a, std::uint32_t b, bool thorough) = 0;
   /// One slice. True when the job is done.
   virtual bool step() = 0;
   virtual const PlaceHypotheses& hypotheses() const = 0;
+  /// How the last comparison ended. A pair that was dropped (coarse, rotation) is no candidate whatever its hypotheses.
+  virtual CompareEnd compare_end() const { return CompareEnd::compared; }
   /// What has to be stored to restore a description. Of the one described or restored last.
   virtual Span<const std::uint8_t> digest_bytes(std::uint32_t index) const = 0;
   /// Whether all descriptions are held. Otherwise only that of the submap described last and that of the one restored

@@ -119,6 +119,12 @@ class Matcher {
   /// degenerate: one of them is not ready; there are no hypotheses then.
   Status begin_match(const Features& a, const Features& b, const MatchOptions& options = {});
 
+  /// Rotation peaks that the last match found and left aside for MatchOptions::max_peaks. Once step() has returned true.
+  std::size_t untried_rotations() const;
+  /// Goes on with the last match, which has ended and no other job has followed: its untried rotations are tried.
+  /// hypotheses() are of these alone then. False where there are none.
+  bool begin_further();
+
   /// Names the query: from now on matches with `b`, told by where its image lies, keep its turned spectra for the next
   /// one, until b is extracted anew or another query is named. Only where MatcherConfig::kept_turns is not 0.
   void keep_turned(const Features& b);
