@@ -268,7 +268,7 @@ void MapCollection::finish_screening() {
   event.accepted = event.reason == LinkReason::none;
   report(event);
   if (event.accepted) {
-    (void)candidates_.push({other_, event.agreement});
+    (void)candidates_.push({other_, rank_of(event.agreement, event.score)});
   }
   ++other_;
   stage_ = Stage::screen;

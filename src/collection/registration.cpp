@@ -183,7 +183,7 @@ SpectralRegistration::Candidate SpectralRegistration::unwrapped(const Hypothesis
       }
     }
   }
-  best.rank = best.agreement * std::sqrt(std::max(best.peak, 0.0F));
+  best.rank = rank_of(best.agreement, best.peak);
   return best;
 }
 
@@ -246,7 +246,7 @@ void SpectralRegistration::finish_alignment() {
       place.inlier_share = r.inlier_share;
       place.agreement = agreement.value().score * r.inlier_share;
       place.overlap = agreement.value().overlap;
-      insert_by_agreement(hypotheses_, place);
+      insert_by_rank(hypotheses_, place);
     }
   }
   begin_alignment();

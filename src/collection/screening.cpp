@@ -9,10 +9,10 @@ constexpr std::size_t kLinesPerStep = 32;
 
 }  // namespace
 
-void insert_by_agreement(PlaceHypotheses& list, const PlaceHypothesis& hypothesis) {
+void insert_by_rank(PlaceHypotheses& list, const PlaceHypothesis& hypothesis) {
+  const float rank = rank_of(hypothesis.agreement, hypothesis.peak);
   std::size_t at = 0;
-  while (at < list.size() && (list[at].agreement > hypothesis.agreement ||
-                              (list[at].agreement == hypothesis.agreement && list[at].peak >= hypothesis.peak))) {
+  while (at < list.size() && rank_of(list[at].agreement, list[at].peak) >= rank) {
     ++at;
   }
   list.insert(at, hypothesis);
@@ -248,7 +248,7 @@ void SpectralScreening::verify_one() {
   out.a_T_b = h.a_T_b;
   out.peak = h.peak;
   out.agreement = verifier_.agreement(h.a_T_b);
-  insert_by_agreement(hypotheses_, out);
+  insert_by_rank(hypotheses_, out);
   ++verify_next_;
   if (verify_next_ >= found.size() || verify_next_ >= config_.verified ||
       found[verify_next_].peak < config_.verified_share * found[0].peak) {

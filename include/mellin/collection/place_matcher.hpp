@@ -4,6 +4,7 @@
 // by implementing these two interfaces.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 #include "mellin/core/containers.hpp"
@@ -24,8 +25,12 @@ struct PlaceHypothesis {
   float confidence = 0.0F;    ///< probability that the pose is right (spectral/confidence.hpp); from registration only
 };
 
+/// How promising a hypothesis is before it is aligned: over the pairs of recorded drives this ranks better than
+/// agreement or peak alone (`mellin eval screening`, scores peak, agreement, rank).
+inline float rank_of(float agreement, float peak) { return agreement * std::sqrt(peak > 0.0F ? peak : 0.0F); }
+
 inline constexpr std::size_t kMaxPlaceHypotheses = 6;
-/// Best first: by agreement, after registration by confidence.
+/// Best first: by rank, after registration by confidence.
 using PlaceHypotheses = FixedList<PlaceHypothesis, kMaxPlaceHypotheses>;
 
 /// How far a comparison of two digests came.

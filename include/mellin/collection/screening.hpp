@@ -187,7 +187,7 @@ class SpectralScreening final : public DigestMatcher {
   PlaceHypotheses hypotheses_;
 };
 
-/// Inserts by falling agreement, then peak; the worst drops out when full.
-void insert_by_agreement(PlaceHypotheses& list, const PlaceHypothesis& hypothesis);
+/// Inserts by falling rank; the worst drops out when full.
+void insert_by_rank(PlaceHypotheses& list, const PlaceHypothesis& hypothesis);
 
 }  // namespace mellin
