@@ -84,4 +84,16 @@ TEST_SUITE("confidence") {
     }
     CHECK(confidence({}) < 0.01F);
   }
+
+  TEST_CASE("of rivals that exclude each other, one is right at most") {
+    // Bayes: with odds of 9, 4 and 1 (90, 80 and 50 %) against none of them, the shares are 9, 4, 1 and 1 of 15.
+    const float odds_of[] = {odds(0.9F), odds(0.8F), odds(0.5F)};
+    CHECK(odds_of[0] == doctest::Approx(9.0));
+    CHECK(beside_rivals(0.9F, odds_of[1] + odds_of[2]) == doctest::Approx(9.0 / 15.0));
+    CHECK(beside_rivals(0.8F, odds_of[0] + odds_of[2]) == doctest::Approx(4.0 / 15.0));
+    CHECK(beside_rivals(0.5F, odds_of[0] + odds_of[1]) == doctest::Approx(1.0 / 15.0));
+    CHECK(beside_rivals(0.7F, 0.0F) == doctest::Approx(0.7));
+    CHECK(beside_rivals(1.0F, odds(1.0F)) <= 0.5F);
+    CHECK(beside_rivals(0.0F, 0.0F) == 0.0F);
+  }
 }

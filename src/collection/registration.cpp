@@ -254,8 +254,18 @@ void SpectralRegistration::finish_alignment() {
 
 /// Each hypothesis' confidence, which depends on the others, and their order by it.
 void SpectralRegistration::judge_hypotheses() {
+  float alone[kMaxPlaceHypotheses] = {};
   for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
-    hypotheses_[i].confidence = confidence(evidence_of(hypotheses_, i), config_.confidence);
+    alone[i] = confidence(evidence_of(hypotheses_, i), config_.confidence);
+  }
+  for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
+    float rival_odds = 0.0F;
+    for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
+      if (elsewhere(hypotheses_[i].a_T_b, hypotheses_[k].a_T_b)) {
+        rival_odds += odds(alone[k]);
+      }
+    }
+    hypotheses_[i].confidence = beside_rivals(alone[i], rival_odds);
   }
   // By insertion: they are few, and std::stable_sort would ask for a heap.
   for (std::size_t i = 1; i < hypotheses_.size(); ++i) {

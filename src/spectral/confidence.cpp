@@ -45,4 +45,14 @@ float confidence(const PoseEvidence& evidence, const ConfidenceModel& model) {
   return static_cast<float>(1.0 / (1.0 + exp(std::clamp(-sum, -60.0, 60.0))));
 }
 
+float odds(float probability) {
+  const float p = std::clamp(probability, 0.0F, 1.0F - 1e-6F);
+  return p / (1.0F - p);
+}
+
+float beside_rivals(float probability, float rival_odds) {
+  const float own = odds(probability);
+  return own / (1.0F + own + rival_odds);
+}
+
 }  // namespace mellin

@@ -12,14 +12,13 @@
 #include <cstddef>
 #include <vector>
 
+#include "host/heap_arena.hpp"
 #include "host/simulator.hpp"
 #include "mellin/config.hpp"
 #include "mellin/core/arena.hpp"
 
 namespace {
 
-using mellin::Arena;
-using mellin::MeasureArena;
 using mellin::Span;
 
 enum class Of : int { taken, other, submap };
@@ -47,14 +46,11 @@ const mellin::host::SimSession& drive() {
 class Pass {
  public:
   explicit Pass(const mellin::Config& config) : cells_(std::size_t{config.side} * config.side) {
-    MeasureArena measure;
-    (void)mellin::ParticleMapper::carve(measure, config.mapper);
-    (void)mellin::SubmapBuilder::carve(measure, config.submaps);
-    bytes_.resize(measure.use().total());
-    Arena arena(Span<std::byte>(bytes_.data(), bytes_.size()));
-    mapper_ = mellin::ParticleMapper(config.mapper, mellin::ParticleMapper::carve(arena, config.mapper),
+    const auto mapper = [&](auto& arena) { return mellin::ParticleMapper::carve(arena, config.mapper); };
+    const auto builder = [&](auto& arena) { return mellin::SubmapBuilder::carve(arena, config.submaps); };
+    mapper_ = mellin::ParticleMapper(config.mapper, mapper_memory_.carve(mapper),
                                      Span<const mellin::LaserConfig>(config.lasers, mellin::kMaxLasers), 1);
-    builder_ = mellin::SubmapBuilder(config.submaps, mellin::SubmapBuilder::carve(arena, config.submaps));
+    builder_ = mellin::SubmapBuilder(config.submaps, builder_memory_.carve(builder));
   }
 
   void add(const mellin::host::SimScan& in) {
@@ -95,7 +91,8 @@ class Pass {
     worst_[index(of)] = std::max(worst_[index(of)], spent);
   }
 
-  std::vector<std::byte> bytes_;
+  mellin::host::HeapArena mapper_memory_;
+  mellin::host::HeapArena builder_memory_;
   std::vector<std::uint8_t> cells_;
   mellin::ParticleMapper mapper_;
   mellin::SubmapBuilder builder_;

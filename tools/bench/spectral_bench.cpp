@@ -19,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "host/heap_arena.hpp"
 #include "mellin/core/arena.hpp"
 #include "mellin/spectral/fft2.hpp"
 #include "mellin/spectral/matcher.hpp"
@@ -26,26 +27,16 @@
 namespace {
 
 using mellin::Arena;
-using mellin::MeasureArena;
 using mellin::Span;
 
 /// What Component::carve() gives for `config`, over memory of its own.
 template <class Component, class Config>
-class Carved {
- public:
-  explicit Carved(const Config& config) : bytes_(required(config)) {
-    Arena arena(Span<std::byte>(bytes_.data(), bytes_.size()));
-    memory = Component::carve(arena, config);
-  }
-  decltype(Component::carve(std::declval<Arena&>(), std::declval<const Config&>())) memory;
+struct Carved {
+  explicit Carved(const Config& config)
+      : memory(heap.carve([&](auto& arena) { return Component::carve(arena, config); })) {}
 
- private:
-  static std::size_t required(const Config& config) {
-    MeasureArena measure;
-    Component::carve(measure, config);
-    return measure.use().total();
-  }
-  std::vector<std::byte> bytes_;
+  mellin::host::HeapArena heap;
+  decltype(Component::carve(std::declval<Arena&>(), std::declval<const Config&>())) memory;
 };
 
 /// A picture like a submap's: walls, in six directions so that there are as many rotation peaks, turned by `angle_rad`.

@@ -1,7 +1,6 @@
 #include "host/grid_registration.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -93,8 +92,8 @@ RegistrationConfig grid_registration_config(std::size_t largest, double resoluti
 }
 
 PaddedPair pad(const OccupancyImage& a, const OccupancyImage& b, double resolution_m) {
-  if (!(resolution_m > 0.0) || !std::isfinite(resolution_m)) {
-    throw std::invalid_argument("the resolution is a positive number of metres");
+  if (!(resolution_m >= kFinestResolution_m && resolution_m <= kCoarsestResolution_m)) {
+    throw std::invalid_argument("the resolution is from 0.0001 to 100 m a cell");
   }
   PaddedPair pair;
   pair.config = grid_registration_config(std::max({a.width, a.height, b.width, b.height}), resolution_m);

@@ -22,6 +22,10 @@ struct GridHypothesis {
 /// Hypotheses from this confidence on are a match.
 inline constexpr double kAcceptedConfidence = 0.5;
 
+/// Edges of a cell that are taken, m.
+inline constexpr double kFinestResolution_m = 1e-4;
+inline constexpr double kCoarsestResolution_m = 100.0;
+
 /// How grids of at most `largest` cells along a side are registered: pixels and verification near 0.2 m, as many
 /// hypotheses aligned as can be. Throws std::invalid_argument where the grids are too large.
 RegistrationConfig grid_registration_config(std::size_t largest, double resolution_m);
@@ -50,7 +54,7 @@ struct PaddedPair {
 PaddedPair pad(const OccupancyImage& a, const OccupancyImage& b, double resolution_m);
 
 /// All distinct hypotheses, best confidence first; empty where a grid shows nothing. `resolution_m` is the edge of a
-/// cell in both. Throws std::invalid_argument where it is not a positive number, or the grids are too large.
+/// cell in both. Throws std::invalid_argument where it is not one that is taken, or the grids are too large.
 std::vector<GridHypothesis> register_grids(const OccupancyImage& a, const OccupancyImage& b, double resolution_m);
 std::vector<GridHypothesis> register_grids(const PaddedPair& pair);
 

@@ -16,11 +16,11 @@ class HeapArena {
   auto carve(Carve&& carve) {
     MeasureArena measure;
     carve(measure);
-    const std::size_t bytes = measure.use().total();
-    words_.assign(bytes / sizeof(std::uint64_t), 0);
-    Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(words_.data()), bytes));
+    words_.assign(measure.use().total() / sizeof(std::uint64_t), 0);
+    Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(words_.data()), bytes()));
     return carve(arena);
   }
+  std::size_t bytes() const { return words_.size() * sizeof(std::uint64_t); }
 
  private:
   std::vector<std::uint64_t> words_;

@@ -59,11 +59,7 @@ ImageStore::ImageStore(const std::string& path)
     throw std::runtime_error(path + ": grids of side " + std::to_string(config.side) + ", expected at most " +
                              std::to_string(kMaxStoreSide));
   }
-  MeasureArena measure;
-  static_cast<void>(SubmapStore::carve(measure, config));
-  memory_.resize(measure.use().total() / sizeof(std::uint64_t));
-  Arena arena(Span<std::byte>(reinterpret_cast<std::byte*>(memory_.data()), measure.use().total()));
-  const SubmapStore::Memory memory = SubmapStore::carve(arena, config);
+  const SubmapStore::Memory memory = memory_.carve([&](auto& arena) { return SubmapStore::carve(arena, config); });
   const mellin_log sink = {&messages_, [](void* context, mellin_log_level, const char* line) {
                              static_cast<std::vector<std::string>*>(context)->emplace_back(line);
                            }};

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "host/heap_arena.hpp"
 #include "mellin/store/submap_store.hpp"
 #include "posix/flash_image.hpp"
 
@@ -28,7 +29,7 @@ class ImageStore {
   std::string path_;
   posix::ImageInfo info_;
   posix::FlashImage image_;
-  std::vector<std::uint64_t> memory_;
+  HeapArena memory_;
   std::vector<std::string> messages_;
   SubmapStore store_;
 };

@@ -8,19 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "host/heap_arena.hpp"
+
 namespace mellin::host {
 namespace {
-
-/// Memory of a run-time size, aligned as the arena wants it.
-class Bytes {
- public:
-  explicit Bytes(std::size_t size) : words_((size + sizeof(std::uint64_t) - 1) / sizeof(std::uint64_t)), size_(size) {}
-  Span<std::byte> span() { return {reinterpret_cast<std::byte*>(words_.data()), size_}; }
-
- private:
-  std::vector<std::uint64_t> words_;
-  std::size_t size_;
-};
 
 void require(Status status, const std::string& what) {
   if (status != Status::ok) {
@@ -37,12 +28,10 @@ std::size_t needed_fill(const G2oGraph& graph) {
   for (std::size_t fill = 8 * (graph.ids.size() + pairs.size());; fill *= 2) {
     const BlockCholeskyLimits limits{static_cast<std::uint32_t>(graph.ids.size()),
                                      static_cast<std::uint32_t>(pairs.size()), static_cast<std::uint32_t>(fill)};
-    MeasureArena measure;
-    (void)BlockOrdering::carve(measure, limits);
-    Bytes bytes(measure.use().total());
-    Arena arena(bytes.span());
+    HeapArena memory;
     BlockOrdering ordering;
-    require(ordering.init(limits, BlockOrdering::carve(arena, limits)), "ordering");
+    require(ordering.init(limits, memory.carve([&](auto& arena) { return BlockOrdering::carve(arena, limits); })),
+            "ordering");
     require(ordering.begin(limits.variables, {pairs.data(), pairs.size()}), "ordering");
     const Status status = ordering.analyse(std::numeric_limits<std::uint32_t>::max());
     if (status == Status::ok) {
@@ -83,16 +72,15 @@ GraphRun optimise_graph(G2oGraph& graph, const OptimiserOptions& options, std::s
   config.max_fill = static_cast<std::uint32_t>(std::max(fill, graph.ids.size()));
   require(validate(config), "the graph is too large");
 
-  MeasureArena measure;
-  (void)PoseGraph::carve(measure, config);
-  (void)Optimiser::carve(measure, config);
-  run.arena_bytes = measure.use().total();
-  Bytes bytes(run.arena_bytes);
-  Arena arena(bytes.span());
+  HeapArena poses_memory;
+  HeapArena optimiser_memory;
   PoseGraph poses;
   Optimiser optimiser;
-  require(poses.init(config, PoseGraph::carve(arena, config)), "graph");
-  require(optimiser.init(config, Optimiser::carve(arena, config)), "optimiser");
+  require(poses.init(config, poses_memory.carve([&](auto& arena) { return PoseGraph::carve(arena, config); })),
+          "graph");
+  require(optimiser.init(config, optimiser_memory.carve([&](auto& arena) { return Optimiser::carve(arena, config); })),
+          "optimiser");
+  run.arena_bytes = poses_memory.bytes() + optimiser_memory.bytes();
   add(graph, poses);
 
   const auto start = std::chrono::steady_clock::now();

@@ -159,8 +159,10 @@ class Tracer {
     const SinCos turn = sincos(angle_rad);
     const double centre = 0.5 * static_cast<double>(side_ - 1);
     for (std::size_t i = 0; i < out.size(); ++i) {
-      const double dx = (static_cast<double>(i % side_) - centre) / scale;
-      const double dy = (static_cast<double>(i / side_) - centre) / scale;
+      const std::size_t column = i % side_;
+      const std::size_t row = i / side_;
+      const double dx = (static_cast<double>(column) - centre) / scale;
+      const double dy = (static_cast<double>(row) - centre) / scale;
       out[i] = sample_b(centre + turn.cos * dx + turn.sin * dy, centre + turn.cos * dy - turn.sin * dx);
     }
     return out;

@@ -84,8 +84,10 @@ void each_observed(const OccupancyImage& grid, const Pose2& canvas_T_grid, doubl
   const SinCos turn = sincos(canvas_T_grid.theta);
   for (std::size_t i = 0; i < grid.cells.size(); ++i) {
     if (grid.cells[i] != kUnobserved) {
-      const double x = (static_cast<double>(i % grid.width) + 0.5) * cell_m;
-      const double y = (static_cast<double>(i / grid.width) + 0.5) * cell_m;
+      const std::size_t column = i % grid.width;
+      const std::size_t row = i / grid.width;
+      const double x = (static_cast<double>(column) + 0.5) * cell_m;
+      const double y = (static_cast<double>(row) + 0.5) * cell_m;
       each(i, canvas_T_grid.x + turn.cos * x - turn.sin * y, canvas_T_grid.y + turn.sin * x + turn.cos * y);
     }
   }
@@ -99,8 +101,10 @@ std::vector<Shown> show(const OccupancyImage& grid, const Pose2& a_T_grid, doubl
   const Pose2 grid_T_a = inverse(a_T_grid);
   const SinCos turn = sincos(grid_T_a.theta);
   for (std::size_t i = 0; i < shown.size(); ++i) {
-    const double x = canvas.box.low_x + (static_cast<double>(i % canvas.width) + 0.5) * canvas.pixel_m;
-    const double y = canvas.box.low_y + (static_cast<double>(i / canvas.width) + 0.5) * canvas.pixel_m;
+    const std::size_t right = i % canvas.width;
+    const std::size_t up = i / canvas.width;
+    const double x = canvas.box.low_x + (static_cast<double>(right) + 0.5) * canvas.pixel_m;
+    const double y = canvas.box.low_y + (static_cast<double>(up) + 0.5) * canvas.pixel_m;
     const double column = (grid_T_a.x + turn.cos * x - turn.sin * y) / cell_m;
     const double row = (grid_T_a.y + turn.sin * x + turn.cos * y) / cell_m;
     if (column >= 0.0 && row >= 0.0 && column < static_cast<double>(grid.width) &&

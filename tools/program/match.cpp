@@ -82,7 +82,7 @@ void add_match(CLI::App& app) {
   command->add_option("--mask-a", match->mask_a, "picture that is white where A is observed");
   command->add_option("--mask-b", match->mask_b, "picture that is white where B is observed");
   command->add_option("--resolution", match->resolution_m, "edge of a cell, m")
-      ->check(CLI::Range(1e-4, 1e3))
+      ->check(CLI::Range(host::kFinestResolution_m, host::kCoarsestResolution_m))
       ->capture_default_str();
   command->add_flag("--all", match->all, "print the hypotheses under the acceptance threshold (0.5) too");
   command->add_option("--explain", match->explain,

@@ -37,4 +37,12 @@ void confidence_terms(const PoseEvidence& evidence, float (&terms)[ConfidenceMod
 /// Probability, 0 … 1, that the pose is within 0.5 m and 4 degrees. Numbers that are not finite count as no evidence.
 float confidence(const PoseEvidence& evidence, const ConfidenceModel& model = {});
 
+/// p / (1 - p), finite: p is taken for at most 1 - 1e-6.
+float odds(float probability);
+
+/// What is left of a hypothesis' probability beside rivals of which at most one can be right: o / (1 + o + the rivals'
+/// odds together), o its own. The regression sees each rival's evidence but not that there may be several equal ones:
+/// of n that are sure alone, as in a round or a square room, each is left 1 / n at most.
+float beside_rivals(float probability, float rival_odds);
+
 }  // namespace mellin
