@@ -3,6 +3,7 @@
 
 #include <doctest.h>
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -29,6 +30,9 @@ const std::vector<std::vector<std::uint8_t>>& grids() {
   }();
   return made;
 }
+
+using Pair = std::pair<std::uint32_t, std::uint32_t>;
+constexpr Pair kPairs[] = {{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}};
 
 ScreeningConfig plain() {
   ScreeningConfig config;
@@ -155,50 +159,67 @@ TEST_SUITE("screening") {
     }
   }
 
-  TEST_CASE("each stage drops what it says, keeps a place seen again, and drops nothing where it shall be thorough") {
-    Bench all(plain());
-    const PlaceHypotheses seen_again = all.compare(0, 1);
-    REQUIRE(seen_again[0].agreement > 0.5F);
-    REQUIRE(all.compare(2, 3)[0].agreement < seen_again[0].agreement);
+  TEST_CASE("each stage drops the pairs below its threshold, and none where it shall be thorough") {
+    ScreeningConfig strict = plain();  // its hypotheses are what the stage judges by
     ScreeningConfig config = plain();
-    CompareEnd expected = CompareEnd::compared;
+    float* threshold = nullptr;
+    bool by_peak = false;
+    CompareEnd expected = CompareEnd::coarse;
     SUBCASE("coarse peak") {
-      config.coarse_peaks = 2;
-      config.coarse_peak = 0.25F;
-      expected = CompareEnd::coarse;
+      config.coarse_peaks = strict.coarse_peaks = 2;
+      strict.coarse_agreement = 1.0F;
+      threshold = &config.coarse_peak;
+      by_peak = true;
     }
     SUBCASE("coarse agreement") {
-      config.coarse_peaks = 2;
-      config.coarse_agreement = 0.5F;
-      expected = CompareEnd::coarse;
-    }
-    SUBCASE("rotation") {
-      config.min_rotation_peak = 0.6F;
-      expected = CompareEnd::rotation;
+      config.coarse_peaks = strict.coarse_peaks = 2;
+      strict.coarse_agreement = 1.0F;
+      threshold = &config.coarse_agreement;
     }
     SUBCASE("first peaks") {
+      config.matcher.peak_share = 0.0F;
       config.matcher.max_peaks = 6;
       config.first_peaks = 1;
-      config.further_agreement = 0.5F;
+      strict.matcher.max_peaks = 1;
+      threshold = &config.further_agreement;
       expected = CompareEnd::first_peaks;
     }
+    std::vector<float> judged;
+    Bench judge(strict);
+    for (const Pair& pair : kPairs) {
+      const PlaceHypotheses& found = judge.compare(pair.first, pair.second);
+      REQUIRE_FALSE(found.empty());
+      judged.push_back(by_peak ? found[0].peak : found[0].agreement);
+    }
+    const auto [least, most] = std::minmax_element(judged.begin(), judged.end());
+    *threshold = 0.5F * (*least + *most);
+    REQUIRE(*least < *threshold);
     Bench bench(config);
-    const PlaceHypotheses again = bench.compare(0, 1);
-    CHECK(bench.end() == CompareEnd::compared);
-    CHECK(again[0].agreement == seen_again[0].agreement);
-    CHECK(again[0].a_T_b.theta == seen_again[0].a_T_b.theta);
-    int dropped = 0;
-    for (const auto& [a, b] : {std::pair<std::uint32_t, std::uint32_t>{0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}) {
-      CAPTURE(a);
-      CAPTURE(b);
-      const PlaceHypotheses found = bench.compare(a, b);
-      dropped += bench.end() == expected ? 1 : 0;
-      CHECK((bench.end() == expected || bench.end() == CompareEnd::compared));
-      CHECK(found.empty() == (bench.end() == CompareEnd::rotation));
-      (void)bench.compare(a, b, true);
+    for (std::size_t i = 0; i < judged.size(); ++i) {
+      (void)bench.compare(kPairs[i].first, kPairs[i].second);
+      CHECK(bench.end() == (judged[i] < *threshold ? expected : CompareEnd::compared));
+      (void)bench.compare(kPairs[i].first, kPairs[i].second, true);
       CHECK(bench.end() == CompareEnd::compared);
     }
-    CHECK(dropped >= 3);  // three pairs are of places that have nothing in common
+  }
+
+  TEST_CASE("pairs without a rotation that stands out are dropped, a place seen again is not") {
+    ScreeningConfig config = plain();
+    Bench all(config);
+    config.min_rotation_peak = 0.6F;
+    Bench bench(config);
+    const PlaceHypotheses seen_again = all.compare(0, 1);
+    CHECK(bench.compare(0, 1)[0].agreement == seen_again[0].agreement);
+    CHECK(bench.end() == CompareEnd::compared);
+    int dropped = 0;
+    for (const Pair& pair : kPairs) {
+      const bool empty = bench.compare(pair.first, pair.second).empty();
+      CHECK(bench.end() == (empty ? CompareEnd::rotation : CompareEnd::compared));
+      dropped += empty ? 1 : 0;
+      CHECK(same_bits(bench.compare(pair.first, pair.second, true), all.compare(pair.first, pair.second)));
+      CHECK(bench.end() == CompareEnd::compared);
+    }
+    CHECK(dropped > 0);
   }
 
   TEST_CASE("fewer hypotheses are looked at where the strongest stands out") {
