@@ -38,7 +38,11 @@ PlaceHypothesis place(const Pose2& a_T_b, float agreement) {
 class FakeDigests final : public DigestMatcher {
  public:
   std::function<float(std::uint32_t, std::uint32_t)> agreement = [](std::uint32_t, std::uint32_t) { return 0.0F; };
+  std::function<CompareEnd(std::uint32_t, std::uint32_t)> end = [](std::uint32_t, std::uint32_t) {
+    return CompareEnd::compared;
+  };
   std::vector<Pair> compared;
+  std::vector<Pair> thorough_ones;
   std::vector<std::uint8_t> digests = std::vector<std::uint8_t>(4 * 256);
   int restored = 0;
   bool holds_all = true;
@@ -60,8 +64,12 @@ class FakeDigests final : public DigestMatcher {
     ++restored;
     return start();
   }
-  Status begin_compare(std::uint32_t a, std::uint32_t b, bool /*thorough*/) override {
+  Status begin_compare(std::uint32_t a, std::uint32_t b, bool thorough) override {
     compared.emplace_back(a, b);
+    if (thorough) {
+      thorough_ones.emplace_back(a, b);
+    }
+    end_ = end(a, b);
     for (const std::uint32_t index : {a, b}) {
       for (std::size_t i = 0; i < 4; ++i) {
         CHECK(digests[4 * index + i] == index + i);  // both are there, and they are the right ones
@@ -75,6 +83,7 @@ class FakeDigests final : public DigestMatcher {
   }
   bool step() override { return --steps_ == 0; }
   const PlaceHypotheses& hypotheses() const override { return hypotheses_; }
+  CompareEnd compare_end() const override { return end_; }
   Span<const std::uint8_t> digest_bytes(std::uint32_t index) const override { return {digests.data() + 4 * index, 4}; }
   bool holds_digests() const override { return holds_all; }
 
@@ -91,6 +100,7 @@ class FakeDigests final : public DigestMatcher {
     return Status::ok;
   }
   std::uint32_t described_ = 0;
+  CompareEnd end_ = CompareEnd::compared;
   int steps_ = 0;
   PlaceHypotheses hypotheses_;
 };
@@ -290,6 +300,50 @@ void check_candidates(std::uint8_t nearby) {
 TEST_CASE("of the pairs that look alike those near by the graph, then the best are registered, one a place") {
   for (const std::uint8_t nearby : std::initializer_list<std::uint8_t>{0, 1, 2}) {
     check_candidates(nearby);
+  }
+}
+
+TEST_CASE(
+    "pairs that screening drops are counted, and no candidates; those near by the graph it shall look at in full") {
+  port::HeapFlash flash({4096, 256, 256});
+  CollectionConfig config;
+  config.nearby_m = 2.0F;
+  Bench bench(flash.flash(), config);
+  bench.digests.agreement = [](std::uint32_t, std::uint32_t) { return 0.9F; };
+  bench.digests.end = [](std::uint32_t a, std::uint32_t) { return static_cast<CompareEnd>(a % 4); };
+  bench.grids.agreement = [](std::uint32_t, std::uint32_t) { return 0.0F; };  // no edges: the graph stays as it is
+  bench.session(1);
+  constexpr std::uint32_t kSubmaps = 16;
+  for (std::uint32_t i = 0; i < kSubmaps; ++i) {
+    bench.insert(10 * i);
+  }
+  std::uint64_t ends[4] = {};
+  std::vector<Pair> near;
+  for (std::uint32_t b = 0; b < kSubmaps; ++b) {
+    for (std::uint32_t a = 0; a < b; ++a) {
+      if (!shares(a, b)) {
+        ++ends[a % 4];
+        if (translation(between(true_pose(a), true_pose(b))) < 2.0) {
+          near.emplace_back(a, b);
+        }
+      }
+    }
+  }
+  REQUIRE(near.size() > 1);
+  CHECK(bench.digests.thorough_ones == near);
+  const CollectionStatistics& statistics = bench.map.statistics();
+  CHECK(statistics.pairs_dropped_coarse == ends[1]);
+  CHECK(statistics.pairs_dropped_rotation == ends[2]);
+  CHECK(statistics.pairs_cut_short == ends[3]);
+  const LinkReason reasons[] = {LinkReason::none, LinkReason::coarse_mismatch, LinkReason::no_rotation,
+                                LinkReason::none};
+  for (const PairEvent& event : bench.events) {
+    if (event.stage == PairEvent::Stage::screened) {
+      CHECK(event.reason == reasons[event.a % 4]);
+      CHECK(event.accepted == (event.reason == LinkReason::none));
+    } else {
+      CHECK(reasons[event.a % 4] == LinkReason::none);
+    }
   }
 }
 

@@ -1,4 +1,4 @@
-// The hot loops of this layer, compiled once for each vector unit (vector_unit.hpp) from one text, kernels_body.hpp.
+// The hot loops of this layer, compiled once for each vector unit (vector_unit.hpp) from one text, kernels_body.inc.
 // Each kernel gives the same bits on every unit.
 #pragma once
 
@@ -42,16 +42,16 @@ struct Kernels {
   void (*turned_run)(const TurnedRun& from, std::size_t begin, std::size_t end, float* out);
 };
 
-extern const Kernels kPortableKernels;
-extern const Kernels kAvx2Kernels;  // only where the build has it
+const Kernels& portable_kernels();
+const Kernels& avx2_kernels();  // only where the build has it
 
 /// The portable ones where the build has none for `unit`.
 inline const Kernels& kernels_of(VectorUnit unit) {
 #ifdef MELLIN_AVX2
-  return unit == VectorUnit::avx2 ? kAvx2Kernels : kPortableKernels;
+  return unit == VectorUnit::avx2 ? avx2_kernels() : portable_kernels();
 #else
   static_cast<void>(unit);
-  return kPortableKernels;
+  return portable_kernels();
 #endif
 }
 

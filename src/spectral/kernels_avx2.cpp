@@ -3,7 +3,7 @@
 #include "spectral/kernels.hpp"
 
 #if defined(MELLIN_AVX2) && defined(__AVX2__)
-#define MELLIN_KERNELS kAvx2Kernels
+#define MELLIN_KERNELS avx2_kernels
 #define MELLIN_LANES(name) mellin_avx2_##name
-#include "spectral/kernels_body.hpp"
+#include "spectral/kernels_body.inc"
 #endif

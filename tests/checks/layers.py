@@ -29,7 +29,7 @@ stdio.h cstdio stdlib.h cstdlib time.h ctime chrono random
 """.split())
 
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.MULTILINE)
-SOURCES = (".h", ".hpp", ".c", ".cpp")
+SOURCES = (".h", ".hpp", ".inc", ".c", ".cpp")
 
 
 def layer_of(path):

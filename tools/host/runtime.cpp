@@ -55,10 +55,10 @@ double fftw_us(std::uint16_t side) {
   struct Free {
     void operator()(void* memory) const { fftwf_free(memory); }
   };
-  const std::size_t pixels = std::size_t{side} * side;
+  const std::size_t pixels = std::max<std::size_t>(1, std::size_t{side} * side);
   const std::unique_ptr<float, Free> image(fftwf_alloc_real(pixels));
   const std::unique_ptr<fftwf_complex, Free> spectrum(fftwf_alloc_complex(std::size_t{side} * (side / 2U + 1)));
-  const fftwf_plan plan = fftwf_plan_dft_r2c_2d(side, side, image.get(), spectrum.get(), FFTW_MEASURE);
+  fftwf_plan_s* const plan = fftwf_plan_dft_r2c_2d(side, side, image.get(), spectrum.get(), FFTW_MEASURE);
   for (std::size_t i = 0; i < pixels; ++i) {
     image.get()[i] = static_cast<float>(i % 7);
   }
