@@ -27,12 +27,12 @@ bool same_place(const Pose2& p, const Pose2& q) {
   return translation(off) < kSameDistance_m && off.theta < kSameAngle_rad && off.theta > -kSameAngle_rad;
 }
 
-bool elsewhere(const Pose2& p, const Pose2& q) {
+}  // namespace
+
+bool exclude_each_other(const Pose2& p, const Pose2& q) {
   const Pose2 off = between(p, q);
   return translation(off) >= kElsewhere_m || std::fabs(off.theta) >= kElsewhere_rad;
 }
-
-}  // namespace
 
 PoseEvidence evidence_of(const PlaceHypotheses& hypotheses, std::size_t i) {
   const PlaceHypothesis& place = hypotheses[i];
@@ -42,7 +42,7 @@ PoseEvidence evidence_of(const PlaceHypotheses& hypotheses, std::size_t i) {
   evidence.overlap = place.overlap;
   evidence.peak = place.peak;
   for (const PlaceHypothesis& other : hypotheses) {
-    if (elsewhere(place.a_T_b, other.a_T_b)) {
+    if (exclude_each_other(place.a_T_b, other.a_T_b)) {
       evidence.rival_strength = std::max(evidence.rival_strength, other.agreement);
       evidence.rival_peak = std::max(evidence.rival_peak, other.peak);
     }
@@ -261,7 +261,7 @@ void SpectralRegistration::judge_hypotheses() {
   for (std::size_t i = 0; i < hypotheses_.size(); ++i) {
     float rival_odds = 0.0F;
     for (std::size_t k = 0; k < hypotheses_.size(); ++k) {
-      if (elsewhere(hypotheses_[i].a_T_b, hypotheses_[k].a_T_b)) {
+      if (exclude_each_other(hypotheses_[i].a_T_b, hypotheses_[k].a_T_b)) {
         rival_odds += odds(alone[k]);
       }
     }

@@ -38,7 +38,12 @@ struct Evidence {
   bool fitted = false;
   std::vector<Judged> judged;              ///< a sample a hypothesis
   std::vector<host::EvalPair> pairs;       ///< of all numbers of scans
+  std::vector<Pose2> poses;                ///< of each sample
   std::vector<std::size_t> first_of_pair;  ///< index into judged; the next pair's begins where it ends
+
+  std::size_t end_of_pair(std::size_t p) const {
+    return p + 1 < first_of_pair.size() ? first_of_pair[p + 1] : judged.size();
+  }
 };
 
 double probability(const std::vector<double>& terms, const std::vector<double>& weights) {
@@ -49,10 +54,22 @@ double probability(const std::vector<double>& terms, const std::vector<double>& 
   return 1.0 / (1.0 + std::exp(-sum));
 }
 
-std::vector<host::Stated> stated(const std::vector<Judged>& judged, const std::vector<double>& weights) {
+/// What registration would say of each hypothesis with these weights: rivals share their probability.
+std::vector<host::Stated> stated(const Evidence& e, const std::vector<double>& weights) {
   std::vector<host::Stated> out;
-  for (const Judged& j : judged) {
-    out.push_back({probability(j.terms, weights), j.right});
+  for (std::size_t p = 0; p < e.pairs.size(); ++p) {
+    const std::size_t first = e.first_of_pair[p];
+    const std::size_t end = e.end_of_pair(p);
+    for (std::size_t i = first; i < end; ++i) {
+      float rival_odds = 0.0F;
+      for (std::size_t k = first; k < end; ++k) {
+        if (exclude_each_other(e.poses[i], e.poses[k])) {
+          rival_odds += odds(static_cast<float>(probability(e.judged[k].terms, weights)));
+        }
+      }
+      const auto alone = static_cast<float>(probability(e.judged[i].terms, weights));
+      out.push_back({static_cast<double>(beside_rivals(alone, rival_odds)), e.judged[i].right});
+    }
   }
   return out;
 }
@@ -122,6 +139,7 @@ class ConfidenceEvaluation {
       out.pairs.push_back(pairs[i]);
       for (const host::FoundPose& pose : found[i]) {
         const host::PoseError error = host::pose_error(pairs[i], pose);
+        out.poses.push_back(pose.a_T_b);
         float terms[ConfidenceModel::kWeights];
         confidence_terms(pose.evidence, terms);
         out.judged.push_back({{std::begin(terms), std::end(terms)},
@@ -140,7 +158,7 @@ class ConfidenceEvaluation {
     host::PlotPanel panel{title, {"Stated probability", 0.0, 1.0}, {"Share right", 0.0, 1.0}, {}, {}};
     panel.series.push_back({"", {{0.0, 0.0}, {1.0, 1.0}}, 7, true});
     for (std::size_t i = 0; i < all.size(); ++i) {
-      const std::vector<host::Stated> said = stated(all[i].judged, weights);
+      const std::vector<host::Stated> said = stated(all[i], weights);
       const std::vector<host::ReliabilityBin> bins = host::reliability(said, kBins);
       host::PlotSeries series{all[i].name + (all[i].fitted ? " (fitted)" : ""), {}, i, all[i].fitted};
       for (const host::ReliabilityBin& bin : bins) {
@@ -151,25 +169,23 @@ class ConfidenceEvaluation {
         }
       }
       panel.series.push_back(series);
-      summarise(file, weights, all[i], host::calibration_error(bins), host::brier_score(said));
+      summarise(file, said, all[i], host::calibration_error(bins), host::brier_score(said));
     }
     write_figure(options_.common.directory, "reliability-" + file, "Reliability of the confidence", {panel});
   }
 
-  void summarise(const std::string& file, const std::vector<double>& weights, const Evidence& e, double error,
+  void summarise(const std::string& file, const std::vector<host::Stated>& said, const Evidence& e, double error,
                  double brier) {
     std::vector<host::Decision> detection;
     std::size_t accepted = 0;
     std::size_t wrong = 0;
     for (std::size_t p = 0; p < e.pairs.size(); ++p) {
-      const std::size_t end = p + 1 < e.pairs.size() ? e.first_of_pair[p + 1] : e.judged.size();
       double best = 0.0;
       bool right = false;
-      for (std::size_t i = e.first_of_pair[p]; i < end; ++i) {
-        const double said = probability(e.judged[i].terms, weights);
-        if (said > best) {
-          best = said;
-          right = e.judged[i].right;
+      for (std::size_t i = e.first_of_pair[p]; i < e.end_of_pair(p); ++i) {
+        if (said[i].probability > best) {
+          best = said[i].probability;
+          right = said[i].right;
         }
       }
       accepted += best >= 0.5 ? 1U : 0U;

@@ -34,6 +34,9 @@ struct RegistrationConfig {
   ConfidenceModel confidence;
 };
 
+/// Whether at most one of two poses of b in a can be right: they differ by 1 m or 0.2 rad at least.
+bool exclude_each_other(const Pose2& p, const Pose2& q);
+
 /// What speaks for hypothesis `i` of a registration's, the best of the others as its rival.
 PoseEvidence evidence_of(const PlaceHypotheses& hypotheses, std::size_t i);
 
