@@ -26,16 +26,16 @@ struct CascadeCommand {
   std::string directory;
 };
 
-/// Each stage by itself where it begins to pay, and the stages together. All with two rotation peaks.
+/// Numbers of rotation peaks, then each stage by itself, and the last two together. What is not named is off.
 const std::vector<std::string> kVariants = {
     "screening.max_peaks=6",
     "screening.max_peaks=2",
     "screening.max_peaks=1",
-    "screening.max_peaks=2,screening.min_rotation_peak=0.5",
-    "screening.max_peaks=2,screening.verified=4,screening.verified_share=0.6",
-    "screening.max_peaks=2,screening.first_peaks=1,screening.further_agreement=0.1",
-    "screening.max_peaks=2,screening.coarse_peaks=1,screening.coarse_agreement=0.1",
-    "screening.max_peaks=2,screening.coarse_peaks=2,screening.coarse_agreement=0.15",
+    "screening.max_peaks=2,screening.coarse_peaks=2,screening.coarse_peak=0.2",
+    "screening.max_peaks=2,screening.first_peaks=1,screening.further_agreement=0.2",
+    "screening.max_peaks=2,screening.verified_share=0.8",
+    "screening.max_peaks=2,screening.min_rotation_peak=0.35",
+    "screening.max_peaks=2,screening.min_rotation_peak=0.35,screening.verified_share=0.8",
 };
 
 Config with_settings(Config config, const std::string& settings) {
