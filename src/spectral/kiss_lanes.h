@@ -1,6 +1,6 @@
 /* KissFFT once more, several transforms side by side in the lanes of a vector, where the processor has one that rounds
-   as its scalar unit does. Each lane gives the bits that the plain build gives. MELLIN_LANES(name) is what the file that
-   includes this calls its copy's functions. */
+   as its scalar unit does. Each lane gives the bits that the plain build gives. MELLIN_LANES(name) is what the file
+   that includes this calls its copy's functions. */
 #include "mellin/spectral/fft_lanes.h"
 
 #define USE_SIMD
