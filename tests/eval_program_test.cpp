@@ -87,7 +87,7 @@ TEST_SUITE("eval_program") {
       CHECK(read_bytes(folder.path() + "/one/" + name) == read_bytes(folder.path() + "/three/" + name));
     }
     const std::vector<Row> rows = where(read_csv(folder.path() + "/one/screening.csv"), "judged", "overlap");
-    CHECK(rows.size() == 2 * 2 * 2);  // frames, matchers, scores
+    CHECK(rows.size() == 2 * 2 * 3);  // frames, matchers, scores
     const std::vector<Row> honest = where(where(rows, "frames", "random"), "score", "peak");
     const std::vector<Row> best = where(honest, "method", "best");
     const std::vector<Row> paper = where(honest, "method", "paper");

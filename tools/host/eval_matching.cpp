@@ -159,7 +159,8 @@ bool long_axis(const EvalSubmap& submap, double& angle_rad) {
   for (std::size_t i = 0; i < grid.cells.size(); ++i) {
     if (grid.cells[i] != kUnobserved) {
       const auto x = static_cast<double>(i % grid.side);
-      const auto y = static_cast<double>(i / grid.side);
+      const std::size_t row = i / grid.side;
+      const auto y = static_cast<double>(row);
       n += 1.0;
       sx += x;
       sy += y;

@@ -126,9 +126,9 @@ std::vector<double> fit_logistic(const std::vector<Judged>& samples, const std::
     }
     const Vector step = solve(hessian, gradient);
     const double before = cost_of(samples, weights, penalty);
-    double scale = 1.0;
     Vector next = weights;
-    for (; scale > 1e-6; scale *= 0.5) {
+    for (int halvings = 0; halvings < 20; ++halvings) {
+      const double scale = std::ldexp(1.0, -halvings);
       for (std::size_t i = 0; i < n; ++i) {
         next[i] = std::max(weights[i] - scale * step[i], least[i]);
       }

@@ -119,7 +119,8 @@ class Matcher {
   /// degenerate: one of them is not ready; there are no hypotheses then.
   Status begin_match(const Features& a, const Features& b, const MatchOptions& options = {});
 
-  /// Rotation peaks that the last match found and left aside for MatchOptions::max_peaks. Once step() has returned true.
+  /// Rotation peaks that the last match found and left aside for MatchOptions::max_peaks. Once step() has returned
+  /// true.
   std::size_t untried_rotations() const;
   /// Goes on with the last match, which has ended and no other job has followed: its untried rotations are tried.
   /// hypotheses() are of these alone then. False where there are none.

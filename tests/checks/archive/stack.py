@@ -8,7 +8,7 @@ calls itself (but for KissFFT's kf_work), a frame grows at run time, or a call t
 What the sum holds:
 - each function's own frame by GCC's account, the deepest chain of calls; a tail call counts as a call;
 - calls through pointers, by the source's line: a virtual function is every virtual function of that name; a callback
-  inside the library is every function of that signature; the port's functions and observers (OF_CALLER) are the
+  inside the library is every function of that signature, a kernel every one of that name; the port's functions and observers (OF_CALLER) are the
   caller's own and count as nothing;
 - OUTSIDE bytes, an allowance, for whatever is not compiled here: memcpy and its like, sqrt, and the arithmetic that
   the processor lacks; of those the compiler tells nothing (stack_high_water.py holds the sum to what an image used).
@@ -43,6 +43,9 @@ CALLBACKS = {
     "decided": r"\(void\*, const mellin::PendingLink&, mellin::EdgeId\)",
     "relative": r"\(void\*, mellin::NodeId, mellin::NodeId, mellin::RelativePose&\)",
     "share_scans": r"\(void\*, const mellin::LoopHypothesis&, const mellin::LoopHypothesis&\)",
+    # The kernels of src/spectral/kernels.hpp: of each vector unit the function of that name.
+    **{name: rf"mellin::{{anonymous}}::{name}\(" for name in
+       ("lines", "forward_rows", "inverse_rows", "inverse_rows_search", "whiten", "cross", "turned_run")},
 }
 RECURSIVE = "kf_work"
 
