@@ -13,7 +13,6 @@ namespace {
 
 using host::Decision;
 using host::fixed;
-using host::PairScore;
 using host::PrecisionRecall;
 
 struct ScreeningOptions {
