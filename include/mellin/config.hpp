@@ -128,6 +128,7 @@ constexpr Config micro_profile() {
   c.mapper.odometry.learn_bias = false;
   c.submaps.band_rows = 16;
   c.screening.cache_features = false;
+  c.registration.matcher.translation_peaks = 2;  // more leave a board too little time between scans
   c.registration.alignment.max_points = 1024;
   c.registration.alignment.keep_both = false;
   c.collection.graph.max_edges = 512;
