@@ -136,7 +136,7 @@ class ChangeEvaluation {
         pairs, host::match_pairs(submaps, pairs, screening, options_.common.threads), host::PairScore::peak);
     outcome.registered = host::pose_decisions(
         pairs, host::register_pairs(submaps, pairs, resolved(desktop_profile()).registration, options_.common.threads),
-        host::PairScore::confidence);
+        host::PairScore::agreement);
     for (const host::EvalPair& pair : pairs) {
       outcome.overlaps.push_back(pair.overlap);
     }
