@@ -22,9 +22,13 @@ else
   # Figs. 6 and 7, and the library's whole registration.
   "$mellin" eval registration "${logs[@]}" -o "$out/registration" "$@"
   "$mellin" eval registration "${logs[@]}" -o "$out/registration-aligned" --frames aligned --figures pipeline "$@"
-  # The probability of a pose, fitted on intel and aces, judged on fr079.
+  # The probability of a pose, fitted on intel, aces and a simulated building, judged on fr079 and another one.
   if [ ${#logs[@]} -eq 3 ]; then
-    "$mellin" eval confidence "${logs[0]}" "${logs[2]}" "${logs[1]}" --fit 2 -o "$out/confidence" "$@"
+    for seed in 1 2; do
+      "$mellin" sim --kind offices --seed "$seed" -o "$out/offices$seed"
+    done
+    "$mellin" eval confidence "${logs[0]}" "${logs[2]}" "$out/offices2/sim-0.log" "${logs[1]}" "$out/offices1/sim-0.log" \
+      --fit 3 -o "$out/confidence" "$@"
   fi
 fi
 "$mellin" eval change -o "$out/change"
