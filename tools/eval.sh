@@ -22,6 +22,10 @@ else
   # Figs. 6 and 7, and the library's whole registration.
   "$mellin" eval registration "${logs[@]}" -o "$out/registration" "$@"
   "$mellin" eval registration "${logs[@]}" -o "$out/registration-aligned" --frames aligned --figures pipeline "$@"
+  # What each stage of screening drops and keeps.
+  for log in "${logs[@]}"; do
+    "$mellin" eval cascade "$log" -o "$out/cascade/$(basename "$log" .log.gz)"
+  done
   # The probability of a pose, fitted on intel, aces and a simulated building, judged on fr079 and another one.
   if [ ${#logs[@]} -eq 3 ]; then
     for seed in 1 2; do
